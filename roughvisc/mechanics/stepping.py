@@ -220,11 +220,6 @@ class Point:
     solver_error: float = 0.0
     solver_error_approach: float = 0.0
 
-    @property
-    def is_open(self) -> bool:
-        """Whether the surfaces are apart."""
-        return self.force == 0 and not self.is_late
-
 
 @dataclass(frozen=True)
 class Difference:
@@ -302,11 +297,6 @@ class State:
     distance: float = 0.0
     convolutions: int = 0
 
-    @property
-    def coarse(self) -> Point:
-        """Solution with the longer steps."""
-        return self.twice or self.fine
-
 
 class Step(NamedTuple):
     """Accepted step.
@@ -368,13 +358,15 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
     while state.segment < len(segments):
         number, segment = state.segment, segments[state.segment]
         is_jump, is_start = segment.duration == 0, state.fine.time == 0
-        if is_jump:
-            state = jump(scene, state, segment)
-            steps = [Step(state.fine, state.difference, number, state)]
-        else:
+        if not is_jump:
             slide = segment.slide
             steps = pair_of_steps(scene, state, segment) if slide is None else pair_of_cells(scene, state, slide)
-            state = steps[-1].state
+        elif scene.can_jump:
+            steps = [single_step(scene, state, state.fine.time)]
+        else:  # the next step takes the jump
+            later = entered(scene, state)
+            steps = [Step(later.fine, later.difference, number, later)]
+        state = steps[-1].state
         jumps_next = number < state.segment < len(segments) and segments[state.segment].duration == 0
         if (jumps_next and (scene.can_jump or is_jump)) or (is_jump and not (scene.can_jump or is_start)):
             steps.pop()
@@ -385,38 +377,33 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
 # ---------------------------------------------------------------------------------------------------------- segments
 
 
-def jump(scene: Scene, state: State, segment: Segment) -> State:
-    """Return the state after a jump; without instantaneous compliance the next step takes the jump."""
-    fine, value = state.fine, segment.value(0.0, state.fine.start)
-    if scene.can_jump:
-        return single_step(scene, state, fine.time).state
-    if value == (fine.force if segment.control == "load" else fine.approach):
-        return entered(scene, state)
-    if segment.control == "approach":
-        raise InputError(
-            f"at {fine.time:g} s the approach jumps to {value:g} m, and the material has no instantaneous "
-            "compliance: expected a ramp (over > 0), or a material that can jump"
-        )
-    return entered(scene, state, load=value)
+def entered(scene: Scene, state: State) -> State:
+    """Return the state at the start of the next segment.
 
-
-def entered(scene: Scene, state: State, load: float | None = None) -> State:
-    """Return the state at the start of the next segment, which takes a jump to a load. [N]"""
-    segments, index = scene.program.segments, state.segment + 1
+    Without instantaneous compliance the first step of that segment takes a jump of the load before it.
+    """
+    segments, fine, index = scene.program.segments, state.fine, state.segment + 1
     last, following = segments[index - 1], segments[min(index, len(segments) - 1)]
-    changes = following.control != last.control
+    changes, load = following.control != last.control, fine.force
+    if last.duration == 0 and not scene.can_jump:
+        value = last.value(0.0, fine.start)
+        if last.control == "load":
+            load = value
+        elif value != fine.approach:
+            raise InputError(
+                f"at {fine.time:g} s the approach jumps to {value:g} m, and the material has no instantaneous "
+                "compliance: expected a ramp (over > 0), or a material that can jump"
+            )
     # without instantaneous compliance a corner of the approach is a jump of the load
-    jumps = not scene.can_jump and (changes or last.control == "approach")
+    jumps, jumped = not scene.can_jump and (changes or last.control == "approach"), load != fine.force
     points = []
-    for point in (state.fine, state.coarse):
-        start = point.approach if following.control == "approach" else point.force if load is None else load
-        is_late = load is not None or (jumps and point.force > 0)
-        points.append(replace(without_past(point), start=start, is_late=is_late))
+    for point in (fine, state.twice or fine):
+        start = point.approach if following.control == "approach" else load if jumped else point.force
+        points.append(replace(without_past(point), start=start, is_late=jumped or (jumps and point.force > 0)))
     # a corner of the histories without a jump: the pairs may keep their length
     lasting = last.duration > 0 and last.slide is None and following.duration > 0 and following.slide is None
-    length = state.length if lasting and not changes and not jumps and state.fine.force > 0 else 0.0
-    twice = points[1] if state.twice else None
-    return replace(state, fine=points[0], twice=twice, segment=index, length=length)
+    length = state.length if lasting and not changes and not jumps and fine.force > 0 else 0.0
+    return replace(state, fine=points[0], twice=points[1] if state.twice else None, segment=index, length=length)
 
 
 def without_past(point: Point) -> Point:
@@ -426,19 +413,19 @@ def without_past(point: Point) -> Point:
 
 def single_step(scene: Scene, state: State, time: float) -> Step:
     """Return one step that both solutions take: a jump, or a step without contact or without memory."""
-    fine, coarse, number = state.fine, state.coarse, state.segment
-    rule: Rule | None = "linear" if fine.is_open else None  # exact while the surfaces are apart
-    new = other = take_step(scene, fine, time, number, rule=rule)
+    fine, coarse, number = state.fine, state.twice or state.fine, state.segment
+    new = other = take_step(scene, fine, time, number, rule="linear")
     if coarse is not fine:
-        rule = "linear" if coarse.is_open else None
+        rule: Rule | None = "linear" if coarse.force == 0 else None
         other = take_step(scene, coarse, time, number, guess=moved(scene, new, coarse, fine), rule=rule)
     shared = state.difference.shared * scene.memory.remaining(time - fine.time)
-    apart, work = replace(difference(scene, new, other), shared=shared), work_of_step(scene, fine, new)
-    reached, coarse = new, other
-    if fine.is_open and new.force == 0:
+    apart = replace(error_at(scene, fine, new, other), shared=shared)
+    reached, twice = new, other
+    if new.force == 0 == fine.force and not fine.is_late:
         reached = without_past(new)
-        coarse = reached if other is new else without_past(other)
-    after = after_steps(scene, state, [reached], coarse, difference=apart, work=state.work + work)
+        twice = reached if other is new else without_past(other)
+    work = state.work + work_of_step(scene, fine, new)
+    after = after_steps(scene, state, [reached], twice, difference=apart, work=work)
     return Step(new, replace(apart, pressure=apart.pressure + shared), number, after)
 
 
@@ -458,10 +445,10 @@ def step_apart(scene: Scene, state: State, closes: float) -> Step:
 
 def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
     """Return the next accepted steps of a segment: a pair, or one step. The last step has the state after them."""
-    fine, coarse, number = state.fine, state.coarse, state.segment
+    fine, coarse, number = state.fine, state.twice or state.fine, state.segment
     began, end = scene.program.corners[number : number + 2]
     event = min(scene.next_kept(fine.time), end)
-    if fine.is_open:
+    if fine.force == 0 and not fine.is_late:
         closes = closing_time(scene, state, segment, event)
         if closes > fine.time:
             return [step_apart(scene, state, closes)]
@@ -488,7 +475,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         once, other = step_of_pair(scene, coarse, last, number, is_soft, moved(scene, second, coarse, fine))
 
         # Error at the end; errors due to cells that have just entered, in the middle and shared by both solutions.
-        apart = error_at(scene, fine, second, once, whole, other)
+        apart = error_at(scene, fine, whole, other)
         left = 1.0 if is_soft else memory.remaining(middle - fine.time)
         unsure = entering(scene, fine, half)
         carried = state.difference.shared
@@ -559,7 +546,7 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     The body moves backwards under the profile by whole cells, without interpolation. The step is then an elastic
     contact problem. The coarse solution moves by two cells per step. Only smaller cells reduce the error.
     """
-    grid, memory, fine, coarse = scene.grid, scene.memory, state.fine, state.coarse
+    grid, memory, fine, coarse = scene.grid, scene.memory, state.fine, state.twice or state.fine
     began, end = scene.program.corners[state.segment : state.segment + 2]
     cells, side = slide.cells(grid.spacing), grid.spacing[slide.axis]
     taken = round((fine.time - began) / (end - began) * cells)
@@ -580,7 +567,7 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     if coarse is not fine or count == 2:
         once = over(coarse, count, last.time, moved(scene, last, coarse, fine))
     force = friction(scene, last, slide)
-    apart = error_at(scene, fine, last, once, last, once)
+    apart = error_at(scene, fine, last, once)
     apart = replace(apart, friction=abs(force - friction(scene, once, slide)))
     if count == 1:  # the coarse solution takes the same step
         apart = apart.or_larger(state.difference)
@@ -603,7 +590,7 @@ def added(scene: Scene, state: State, second: Point, once: Point, force: float, 
 
     Errors are relative to the largest force [N] and approach [m].
     """
-    fine, coarse, memory, taken = state.fine, state.coarse, scene.memory, second.time - state.fine.time
+    fine, coarse, memory, taken = state.fine, state.twice or state.fine, scene.memory, second.time - state.fine.time
     control = scene.program.segments[state.segment].control
     following = min(scene.next_kept(math.nextafter(second.time, 0)), scene.program.duration)
     # errors are relative to the largest values, including the next kept time
@@ -664,37 +651,37 @@ def step_of_pair(
     return point, replace(found, time=time, approach=point.approach, before=point.before)
 
 
-def error_at(scene: Scene, before: Point, fine: Point, coarse: Point, shown: Point, other: Point) -> Difference:
-    """Return the error of a row at the end of a pair.
+def error_at(scene: Scene, before: Point, fine: Point, coarse: Point) -> Difference:
+    """Return the stated errors of a fine solution, from its difference to the coarse solution at the same time.
 
     Parameters
     ----------
     scene : Scene
         Input of the time stepping.
     before : Point
-        Start of the pair.
+        Last point that both solutions started from.
     fine, coarse : Point
-        Both solutions at the end of the pair.
-    shown, other : Point
-        The same solutions with the pressures at that time.
+        Both solutions, with the pressures at that time.
     """
-    apart = difference(scene, shown, other)
-    if not scene.keeps(fine.time) or fine is coarse:
+    if fine is coarse:
+        return Difference()
+    grid, (stated, of_approach) = scene.grid, scene.stated
+    pressure = stated * (float(abs(fine.pressure - coarse.pressure).sum()) * grid.cell_area)
+    approach = of_approach * abs(fine.approach - coarse.approach)
+    apart = Difference(pressure, stated * abs(fine.force - coarse.force), approach)
+    if not scene.keeps(fine.time) or fine.force == coarse.force == 0:
         return apart
     gap = scene.gap + scene.memory.displacement(fine.history)[0] - fine.approach
     near = scene.gap + scene.memory.displacement(coarse.history)[0] - coarse.approach
-    pressure, coarse_pressure = shown.pressure, other.pressure
-    inside = (pressure > 0) & (pressure <= abs(pressure - coarse_pressure))
-    outside = (pressure == 0) & ((coarse_pressure > 0) | (gap <= abs(gap - near)))
+    inside = (fine.pressure > 0) & (fine.pressure <= abs(fine.pressure - coarse.pressure))
+    outside = (fine.pressure == 0) & ((coarse.pressure > 0) | (gap <= abs(gap - near)))
     if scene.present is not None:
         outside &= scene.present
-    cell, cells = scene.grid.cell_area, int((pressure > 0).sum())
-    jumps = 0.0
+    cells, jumps = int((fine.pressure > 0).sum()), 0.0
     if cells and scene.is_soft(fine.time - before.time):
-        jumps = entering(scene, before, shown) + ENTERING * float(outside.sum()) * fine.force / cells
-    return replace(
-        apart, pressure=apart.pressure + jumps, inside=cell * float(inside.sum()), outside=cell * float(outside.sum())
-    )
+        jumps = entering(scene, before, fine) + ENTERING * float(outside.sum()) * fine.force / cells
+    uncertain = grid.cell_area * float(inside.sum()), grid.cell_area * float(outside.sum())
+    return Difference(pressure + jumps, apart.force, approach, *uncertain)
 
 
 def entering(scene: Scene, before: Point, after: Point) -> float:
@@ -724,7 +711,7 @@ def after_steps(
     """
     fine, apart = points[-1], 0.0
     if coarse is not fine:
-        apart = work_of_step(scene, state.coarse, coarse) - work_of_step(scene, state.fine, fine)
+        apart = work_of_step(scene, state.twice or state.fine, coarse) - work_of_step(scene, state.fine, fine)
     reached = replace(
         state,
         fine=fine,
@@ -737,16 +724,6 @@ def after_steps(
         **totals,
     )
     return entered(scene, reached) if fine.time == scene.program.corners[state.segment + 1] else reached
-
-
-def difference(scene: Scene, fine: Point, coarse: Point) -> Difference:
-    """Return the stated errors of a fine solution, from its difference to the coarse solution."""
-    if fine is coarse:
-        return Difference()
-    stated, of_approach = scene.stated
-    pressure = float(abs(fine.pressure - coarse.pressure).sum()) * scene.grid.cell_area
-    approach = abs(fine.approach - coarse.approach)
-    return Difference(stated * pressure, stated * abs(fine.force - coarse.force), of_approach * approach)
 
 
 def work_of_pair(scene: Scene, start: Point, middle: Point, end: Point) -> tuple[list[float], list[float]]:
@@ -865,7 +842,12 @@ def take_step(
         nothing = grid.xp.zeros(gap.shape)
         history = memory.advance(here.history, prediction, nothing, nothing)
         return Point(time, nothing, 0.0, lowest if by_load else value, history, before, here.start)
-    pressure, unit = guess or extrapolated(scene, here, step)
+    pressure, unit = guess or (here.pressure, memory.unit(here.history))
+    if guess is None and here.before is not None and step > 0:  # extrapolate from the last two points
+        then, former, former_unit = here.before
+        ratio = step / (here.time - then)
+        pressure = pressure + ratio * (pressure - former)
+        unit = None if unit is None or pressure.min() < 0 else unit + ratio * (unit - former_unit)
     guess = None  # frees its memory while the contact is solved
     start = {"start": alpha * pressure, "start_displacement": None if unit is None else alpha * unit}
     del pressure, unit
@@ -886,17 +868,6 @@ def take_step(
     history = memory.advance(here.history, prediction, unit, pressure)
     errors = found.error, found.approach_error
     return Point(time, pressure, force, approach, history, before, here.start, False, *errors)
-
-
-def extrapolated(scene: Scene, here: Point, step: float) -> Guess:
-    """Return the pressure extrapolated from the last two points, and its displacement per unit compliance if known."""
-    now, unit = here.pressure, scene.memory.unit(here.history)
-    if here.before is None or step == 0:
-        return now, unit
-    time, pressure, former = here.before
-    ratio = step / (here.time - time)
-    ahead = now + ratio * (now - pressure)
-    return ahead, None if unit is None or ahead.min() < 0 else unit + ratio * (unit - former)
 
 
 def moved(scene: Scene, second: Point, coarse: Point, fine: Point) -> Guess:
