@@ -22,6 +22,7 @@ causes the present displacement.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Literal, cast
@@ -119,7 +120,7 @@ class Memory:
         factor = 0.5 * (1 - series.poisson)  # of the contact compliance over the shear compliance
         self.series = series
         #: Contact compliance after a time [s], cached because few times recur often. [1/Pa]
-        self.compliance = lru_cache(maxsize=64)(lambda time: float(series.contact_compliance(time)))
+        self.compliance = cast(Callable[[float], float], lru_cache(maxsize=64)(series.contact_compliance))
         self.glassy = factor * series.glassy
         flow = [series.fluidity] if series.fluidity else []
         self.compliances = factor * np.array([*series.compliances, *flow])
@@ -168,7 +169,7 @@ class Memory:
                 mode += earlier[i] * history.earlier[i]
             if before[i]:
                 mode += before[i] * history.fields
-            carried += self.response(mode[0], i)
+            carried += self.weights[i] * mode[0]
         return self.problem(carried, modes, new, step)
 
     def advance(self, history: History, prediction: Prediction, unit: Array, pressure: Array) -> History:
@@ -192,21 +193,20 @@ class Memory:
 
     def displacement(self, history: History) -> Array:
         """Return the displacement [m], and with ``k = 2`` the pressure that causes it, times a compliance [-]."""
-        total = self.response(history.fields, -1)
-        for i, mode in enumerate(history.modes):
-            total += self.response(mode, i)
+        total = self.weights[-1] * history.fields
+        for weight, mode in zip(self.weights[:-1], history.modes, strict=True):
+            total += weight * mode
         return self.on_cells(total)
 
     def at_once(self, history: History) -> Array:
         """Return the instantaneous part of the displacement. [m]"""
-        return self.on_cells(self.response(history.fields[:1], -1))[0]
+        return self.on_cells(self.weights[-1] * history.fields[:1])[0]
 
     def after_rest(self, history: History, time: float) -> Array:
         """Return the displacement after a time without pressure; the present pressure must be zero. [m]"""
-        own = self.recursion(time, 0.0, "linear")[0]
-        total = namespace(history.fields).zeros_like(history.fields[:1])
-        for i, mode in enumerate(history.modes):
-            total += self.response(mode[:1], i, own[i])
+        own, total = self.recursion(time, 0.0, "linear")[0], self.weights[-1] * history.fields
+        for weight, part, mode in zip(self.weights[:-1], own, history.modes, strict=True):
+            total += (weight * part) * mode
         return self.on_cells(total)[0]
 
     # The methods below depend on the kept fields, which are transforms if the waves of a body creep differently.
@@ -214,10 +214,6 @@ class Memory:
     def kept(self, unit: Array, pressure: Array) -> Array:
         """Return the fields of a history. [m Pa], [Pa]"""
         return unit[None] if self.fields == 1 else namespace(unit).stack([unit, pressure])
-
-    def response(self, field: Array, number: int, part: float = 1.0) -> Array:
-        """Return a part of the displacement due to a field of exponential `number`; -1: instantaneous part."""
-        return (self.weights[number] * part) * field
 
     def on_cells(self, total: Array) -> Array:
         """Return the displacement on the cells. [m]"""
@@ -318,11 +314,6 @@ class LayerMemory(Memory):
     def kept(self, unit: Array, pressure: Array) -> Array:
         """Return the transform of the pressure."""
         return self.grid.spectrum(pressure)[None]
-
-    def response(self, field: Array, number: int, part: float = 1.0) -> Array:
-        """Return the product of a transform and a symbol, times a part."""
-        product = field * self.weights[number]
-        return product if part == 1 else part * product
 
     def on_cells(self, total: Array) -> Array:
         """Return the displacement, shape (1, nx, ny). [m]"""
