@@ -6,13 +6,12 @@ each run.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from roughvisc.mechanics.contact.passes import BLOCK_ITERATIONS, BLOCK_TOLERANCE, Free, Last
+from roughvisc.mechanics.contact.passes import BLOCK_ITERATIONS, BLOCK_TOLERANCE, LONGEST_STEP, Free, Last
 from roughvisc.mechanics.grid import Grid
 
 try:
@@ -149,16 +148,11 @@ _change = Kernel(
     "const double t = trial[i] / carried, c = t - held[i]; trial[i] = t; change[i] = c;",
     sums=("c * residual[i]",),
 )
-_inner_at = Kernel(
-    "inner_at",
-    "const double* values, const double* field, const long long* cells",
-    "",
-    sums=("values[i] * field[cells[i]]",),
-)
-_limit = Kernel(
-    "limit",
-    "const double* held, const double* trial, const double* change",
+_line_search = Kernel(
+    "line_search",
+    "const double* held, const double* trial, const double* change, const double* response, const long long* cells",
     "const double h = held[i], c = change[i];",
+    sums=("c * response[cells[i]]",),
     maxima=("h > 0 && trial[i] == 0 ? 1.0 : 0.0", "c < 0 ? -c / h : 0.0"),
 )
 _put = Kernel(
@@ -279,18 +273,15 @@ def cut_step(
     return trial, change, slope
 
 
-def inner_at(values: Array, field: Array, cells: Array) -> float:
-    """Return the inner product of a vector and the values of a field at some cells."""
-    return _inner_at(values.size, values, field, cells)[0]
-
-
-def admissible_fraction(held: Array, trial: Array, change: Array, minimum: float) -> tuple[float, bool]:
-    """Return the fraction of a trial to take, and whether the limit of zero pressure cut it."""
-    empties, steepest = _limit(held.size, held, trial, change)
+def line_search(
+    held: Array, trial: Array, change: Array, slope: float, response: Array, cells: Array
+) -> tuple[float, float, float]:
+    """Return the curvature of the energy along a trial, the fraction of it at the minimum, and the fraction to take."""
+    curvature, empties, steepest = _line_search(held.size, held, trial, change, response, cells)
+    minimum = min(-slope / curvature, LONGEST_STEP) if curvature > 0 else LONGEST_STEP
     if empties > 0:
-        return (1.0, minimum > 1) if minimum > 0.5 else (minimum, False)
-    limit = 1 / steepest if steepest > 0 else math.inf
-    return (min(minimum, limit), minimum > limit) if minimum > 1 else (minimum, False)
+        return curvature, minimum, 1.0 if minimum > 0.5 else minimum
+    return curvature, minimum, min(minimum, 1 / steepest) if minimum > 1 and steepest > 0 else minimum
 
 
 def advance(

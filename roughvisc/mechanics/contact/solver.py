@@ -39,8 +39,6 @@ from roughvisc.mechanics.grid import Boundary, Grid, namespace
 
 Array = Any  # an array of NumPy or CuPy, depending on the grid
 
-#: Largest ratio of a step to its trial: the periodic kernel does not resist a uniform pressure.
-LONGEST_STEP = 30.0
 #: Change of the step length from one iteration to the next: smallest, largest, and largest after a cut step.
 SHRINK, GROW, GROW_AFTER_CUT = 0.3, 3.0, 1.3
 #: Shorter steps than this part of a trial are replaced by a projected-gradient step.
@@ -273,9 +271,8 @@ def solve_contact(
             response -= separation - given
         else:
             response = grid.displacement(on_grid(change, cells)).reshape(-1)
-        curvature = passes.inner_at(change, response, cells)
-        minimum = min(-slope / curvature, LONGEST_STEP) if curvature > 0 else LONGEST_STEP
-        fraction, was_cut = passes.admissible_fraction(held, trial, change, minimum)
+        curvature, minimum, fraction = passes.line_search(held, trial, change, slope, response, cells)
+        was_cut = fraction < minimum
         if is_extrapolated:  # take the whole step: the displacement is known exactly only for its end
             fraction, is_extrapolated = 1.0, False
             curvature = curvature if abs(minimum - 1) < NEARLY_MINIMUM else 0.0

@@ -120,9 +120,9 @@ def test_kernels__are_the_passes_of_numpy(kernels, seed, size, under_load, singl
     both = [one.cut_step(held, direction, residual, 0.3, load) for one in (kernels, passes)]
     same(*both)
     trial, change, _ = both[1]
-    same(*([one.inner_at(change, response, cells)] for one in (kernels, passes)))
     for minimum in (0.2, 0.8, 1.5, 20.0):
-        same(*(one.admissible_fraction(held, trial, change, minimum) for one in (kernels, passes)))
+        slope = -minimum * abs(float(change @ response[cells]))
+        same(*(one.line_search(held, trial, change, slope, response, cells) for one in (kernels, passes)))
     for fraction in (0.4, 1.0):
         both = [(pressure.copy(), separation.copy()) for _ in range(2)]
         kernels.advance(*both[0], cells, (held, trial, change), response, fraction)
