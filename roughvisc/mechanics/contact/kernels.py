@@ -177,14 +177,6 @@ _spot_sums = Kernel(
     "const double l = loads[i];",
     sums=("l * displaced[i]", "l * l / fmax(free[i], 1.0)"),
 )
-_begin = Kernel(
-    "begin",
-    "const double* left, const double* free, const double local, const double own, double* eased, double* loads, "
-    "const double part",
-    "const double n = free[i], e = left[i] / (n > 0 ? n * local + n * n * own : 1.0); eased[i] = e; "
-    "loads[i] = n * e * part;",
-    sums=("left[i] * e",),
-)
 _respond = Kernel(
     "respond",
     "const double* displaced, const double* search, const double* free, const double local, double* response",
@@ -326,16 +318,17 @@ def spot_sums(loads: Array, displaced: Array, free: Array) -> tuple[float, float
 
 def block_pressure(blocks: Grid, left: Array, free: Array, local: float, part: float) -> Array:
     """Solve, by conjugate gradients, for the pressures that displace the blocks by their mean residual."""
-    count, own, found = left.size, blocks.self_influence * part, cupy.zeros(left.size)
-    search, eased, loads, response = (cupy.empty(count) for _ in range(4))
-    (squared,) = _begin(count, left, free, local, own, search, loads, part)
+    count, own, ratio = left.size, blocks.self_influence * part, 0.0
+    found, search, response, eased, loads = (cupy.zeros(count) for _ in range(5))
+    (squared,) = _advance(count, search, response, free, local, own, 0.0, found, left, eased)
     enough = BLOCK_TOLERANCE**2 * squared
-    for iteration in range(BLOCK_ITERATIONS):
+    for _ in range(BLOCK_ITERATIONS):
+        if not squared > enough:
+            break
+        _turn_search(count, eased, ratio, free, part, search, loads)
         displaced = blocks.displacement(loads.reshape(blocks.shape))
         (curvature,) = _respond(count, displaced, search, free, local, response)
         length, before = squared / curvature, squared
         (squared,) = _advance(count, search, response, free, local, own, length, found, left, eased)
-        if iteration + 1 == BLOCK_ITERATIONS or not squared > enough:
-            break
-        _turn_search(count, eased, squared / before, free, part, search, loads)
+        ratio = squared / before
     return found
