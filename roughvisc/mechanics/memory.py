@@ -230,12 +230,13 @@ class Memory:
 
     def roll(self, history: History, cells: int, axis: int) -> History:
         """Return the memory of a periodic body, in the frame of a profile that has moved along an axis."""
+        fields, modes = self.rolled(history.fields, cells, axis), self.rolled(history.modes, cells, axis)
+        earlier = None if history.earlier is None else self.rolled(history.earlier, cells, axis)
+        return History(fields, modes, earlier, history.step)
 
-        def rolled(fields: Array) -> Array:
-            return namespace(fields).roll(fields, -cells, axis - 2)
-
-        earlier = None if history.earlier is None else rolled(history.earlier)
-        return History(rolled(history.fields), rolled(history.modes), earlier, history.step)
+    def rolled(self, fields: Array, cells: int, axis: int) -> Array:
+        """Return fields in the frame of a profile that has moved along an axis."""
+        return namespace(fields).roll(fields, -cells, axis - 2)
 
     def remaining(self, time: float) -> float:
         """Return the part of an error of the history that relaxation leaves after a time. [s]"""
@@ -301,15 +302,12 @@ class LayerMemory(Memory):
     def __init__(self, waves: LayerSeries, duration: float, grid: Grid | None) -> None:
         limits = (waves.q[0], waves.q[-1]) if grid is None else wave_limits(grid.period, grid.spacing)
         super().__init__(waves.fastest_wave(*limits), duration)
+        self.rates, self.parts = np.zeros(1), np.ones(1)  # a common rate of decay does not exist
         self.waves, self.grid = waves, cast(Grid, grid)
         if grid is not None:
             #: Symbol of each exponential [m/Pa], of the fluidity [m/(Pa s)], and of the instantaneous response. [m/Pa]
             alone = np.eye(len(waves.compliances))
             self.weights = [grid.xp.asarray(grid.symbol_of(waves.kernel(one), is_whole=False)) for one in alone]
-
-    def remaining(self, time: float) -> float:
-        """Return one: a common rate of decay does not exist."""
-        return 1.0
 
     def kept(self, unit: Array, pressure: Array) -> Array:
         """Return the transform of the pressure."""
@@ -331,11 +329,9 @@ class LayerMemory(Memory):
         """Return None: the kernel differs between steps."""
         return
 
-    def roll(self, history: History, cells: int, axis: int) -> History:
-        """Return the memory of a periodic body in the frame of a profile that has moved along an axis."""
-        turn = self.grid.turn(cells, axis)
-        earlier = None if history.earlier is None else history.earlier * turn
-        return History(history.fields * turn, history.modes * turn, earlier, history.step)
+    def rolled(self, fields: Array, cells: int, axis: int) -> Array:
+        """Return transforms in the frame of a profile that has moved along an axis."""
+        return fields * self.grid.turn(cells, axis)
 
 
 @dataclass(frozen=True)
