@@ -843,7 +843,8 @@ def take_step(
         history = memory.advance(here.history, prediction, nothing, nothing)
         return Point(time, nothing, 0.0, lowest if by_load else value, history, before, here.start)
     pressure, unit = guess or (here.pressure, memory.unit(here.history))
-    if guess is None and here.before is not None and step > 0:  # extrapolate from the last two points
+    if guess is None and here.before is not None and step > 0:
+        # Extrapolate from the last two points.
         then, former, former_unit = here.before
         ratio = step / (here.time - then)
         pressure = pressure + ratio * (pressure - former)
