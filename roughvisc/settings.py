@@ -21,7 +21,7 @@ from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.program import Program, instant
 from roughvisc.topography.borders import is_mirrored, is_periodic
 from roughvisc.topography.grid import checked
-from roughvisc.topography.recipes import BOUNDARIES, is_indenter, recipe_name
+from roughvisc.topography.recipes import BOUNDARIES, indenter_of, recipe_name
 from roughvisc.units import in_si, number
 from roughvisc.variables import FIELDS
 
@@ -182,7 +182,7 @@ def boundary_of(h: xr.DataArray) -> Literal["free", "periodic"] | None:
     >>> boundary_of(ball), boundary_of(waves), boundary_of(ball + waves)
     ('free', 'periodic', None)
     """
-    if is_indenter(h):
+    if indenter_of(h) is not None:
         return "free"
     made = BOUNDARIES.get(recipe_name(h)) == "periodic" and is_periodic(h)
     return "periodic" if made or is_mirrored(h) else None

@@ -18,8 +18,8 @@ from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import SHORTEST_PAIR, Scene, Step
 from roughvisc.settings import Settings, kept_times
 from roughvisc.topography.borders import JUMP, border_mismatch
-from roughvisc.topography.parameters import rms_slope
-from roughvisc.topography.recipes import is_analytic, is_indenter
+from roughvisc.topography.grid import squared_slopes
+from roughvisc.topography.recipes import indenter_of, is_analytic
 from roughvisc.units import format_quantity
 
 Array = NDArray[np.float64]
@@ -193,7 +193,8 @@ def slope_warning(height: xr.DataArray, boundary: str, approach: float) -> str:
     approach : float
         Largest approach at kept times, from the highest cell. [m]
     """
-    slope = rms_slope(height, boundary == "periodic", approach if boundary == "free" else np.inf)
+    depth = approach if boundary == "free" else math.inf
+    slope = math.sqrt(squared_slopes(height, boundary == "periodic", depth).mean())
     if not slope > LARGEST_SLOPE:
         return ""
     return (
@@ -215,7 +216,7 @@ def stands_alone(height: xr.DataArray, pressure: Array | None, axis: int) -> boo
     axis : {0, 1}
         Axis of the motion.
     """
-    if is_indenter(height):
+    if indenter_of(height) is not None:
         return True
     if is_analytic(height) or pressure is None or not (pressure > 0).any():
         return False

@@ -24,7 +24,7 @@ from roughvisc.errors import RoughviscError
 from roughvisc.mechanics.contact.solver import neighbours
 from roughvisc.mechanics.grid import Boundary
 from roughvisc.topography.grid import cell_edges
-from roughvisc.topography.recipes import is_indenter, remade
+from roughvisc.topography.recipes import indenter_of, remade
 from roughvisc.topography.spectrum import resample, shares
 from roughvisc.variables import GRID_ERROR
 
@@ -174,7 +174,7 @@ def _peak(height: xr.DataArray) -> float:
 
     The bound is half of the descent to the lower neighbour, summed over both axes: the flanks of a cone meet no higher.
     """
-    if is_indenter(height):
+    if indenter_of(height) is not None:
         return 0.0
     values = height.values
     at = np.unravel_index(int(np.nanargmax(values)), values.shape)
@@ -346,7 +346,7 @@ def pressure_distance(found: xr.Dataset, wanted: xr.Dataset) -> Array:
     ndarray, shape (time,)
         Integral of the absolute difference.
     """
-    grids = [tuple(cell_edges(ds[axis].values) for axis in ("x", "y")) for ds in (found, wanted)]
+    grids = [cell_edges(ds) for ds in (found, wanted)]
     sides = [np.diff(grid[0])[0] for grid in grids]
     common = grids[int(np.argmax(sides))]
     low, high = ([reach(grid[axis][end] for grid in grids) for axis in (0, 1)] for end, reach in ((0, min), (-1, max)))

@@ -24,7 +24,7 @@ from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.program import Program
 from roughvisc.settings import Missing, Problem, Settings
 from roughvisc.topography.grid import spacing
-from roughvisc.topography.recipes import grown, highest, is_indenter
+from roughvisc.topography.recipes import grown, highest, indenter_of
 
 Array = NDArray[np.float64]
 #: Number of cells along the longer side of the grid of the estimate, and tolerance of the estimate.
@@ -197,7 +197,7 @@ def choose_surface(
     """
     body, settings, estimate = problem.body, problem.settings, Estimate()
     times = enlarged or 0
-    can_adapt = not body.kernel.raises_surface or is_indenter(profile.height)
+    can_adapt = not body.kernel.raises_surface or indenter_of(profile.height) is not None
     if settings.boundary == "free" and settings.edge == "error" and can_adapt:
         compliance = float(body.material.contact_compliance(program.duration))
         for _ in range(times):
@@ -229,7 +229,7 @@ def choose_domain(profile: Profile, kernel: Kernel, estimate: Estimate, growth: 
     if not may_crop or math.isinf(estimate.approach):
         return whole
     outside, wider, corners = math.inf, 0, estimate.cells
-    is_connected = corners is not None and is_indenter(profile.height)
+    is_connected = corners is not None and indenter_of(profile.height) is not None
     if corners is None or not is_connected:
         corners = np.argwhere(gap <= MARGIN * growth * estimate.approach)
     if not corners.size:

@@ -23,7 +23,7 @@ from roughvisc.observables.frames import expect_result, need
 from roughvisc.plot import style
 from roughvisc.study.storage.folder import atomic_write
 from roughvisc.topography.filters import fill, off_plane
-from roughvisc.topography.grid import cell_edges, cell_side, checked, require_heights, spacing
+from roughvisc.topography.grid import cell_edges, checked, require_heights, spacing
 from roughvisc.topography.spectrum import psd
 from roughvisc.units import Quantity, Unit, in_si, quantities, unit_for
 from roughvisc.variables import AXES, FIELDS, VARIABLES, axis_of
@@ -86,7 +86,7 @@ def drawn(field: xr.DataArray) -> xr.DataArray:
     every = -(-max(field.sizes["x"], field.sizes["y"]) // MOST_CELLS)
     if every > 1:
         blocks = field.coarsen(x=every, y=every, boundary="pad", coord_func="min")
-        to_centre = {axis: (every - 1) / 2 * cell_side(field[axis]) for axis in ("x", "y")}
+        to_centre = {axis: (every - 1) / 2 * side for axis, side in zip("xy", spacing(field), strict=True)}
         field = getattr(blocks, _LOOK[str(field.name)][1])()
         field = field.assign_coords({axis: field[axis] + shift for axis, shift in to_centre.items()})
     return field.load()
@@ -94,12 +94,13 @@ def drawn(field: xr.DataArray) -> xr.DataArray:
 
 def plane_unit(field: xr.DataArray | xr.Dataset) -> Unit:
     """Return the unit for both sides of a map."""
-    return unit_for([np.ptp(cell_edges(field[axis])) for axis in ("x", "y")], "m")
+    return unit_for(list(map(np.ptp, cell_edges(field))), "m")
 
 
 def map_size(field: xr.DataArray | xr.Dataset, width: float, height: float) -> tuple[float, float]:
     """Return the size of the panel of a map, of the shape of the map unless it is a narrow strip. [inch]"""
-    ratio = float(np.clip(np.ptp(cell_edges(field["y"])) / np.ptp(cell_edges(field["x"])), 0.1, 10.0))
+    along_x, along_y = map(np.ptp, cell_edges(field))
+    ratio = float(np.clip(along_y / along_x, 0.1, 10.0))
     return min(width, height / ratio), min(height, width * ratio)
 
 
@@ -134,7 +135,7 @@ def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, norm: Normalize) -> Axes
         Colour scale, in this unit.
     """
     plane, (colours, _, below, _) = plane_unit(field), _LOOK[str(field.name)]
-    x, y = plane(cell_edges(field["x"])), plane(cell_edges(field["y"]))
+    x, y = map(plane, cell_edges(field))
     bad = style.CONTACT if field.name == "flux" else style.MISSING
     values, extent = np.ma.masked_invalid(unit(field.transpose("y", "x"))), (x[0], x[-1], y[0], y[-1])
     cmap = matplotlib.colormaps[colours].with_extremes(bad=bad, under=below)
@@ -262,7 +263,7 @@ def section(dataset: xr.Dataset, time: Quantity | None = None, axis: str = "x", 
     cut = whole.isel({across: index}).load()
     height, surface = cut["height"], cut["height"] + cut["gap"]
     plane, pressure, unit = plane_unit(dataset), unit_for(cut["pressure"], "Pa"), unit_for(surface - height.min(), "m")
-    edges, x = plane(cell_edges(dataset[axis])), plane(dataset[axis])
+    edges, x = plane(cell_edges(dataset)["xy".index(axis)]), plane(dataset[axis])
     figure, (top, bottom) = style.new_panels(2, 1, (4.1, 1.4), shared="x")
     top.stairs(pressure(cut["pressure"]), edges, fill=True, fc=(0, 0.62, 0.45, 0.3), ec=style.GREEN, lw=1)
     top.set(ylim=(0, None), ylabel=pressure.label("Pressure"))
@@ -356,8 +357,8 @@ def surface(height: xr.DataArray | xr.Dataset) -> Figure:
     require_heights(height, "surface")
     low, high = np.nanpercentile(height, (1, 99))
     unit, plane = unit_for([low, high], "m"), plane_unit(height)
-    ratio = float(np.ptp(cell_edges(height["y"])) / np.ptp(cell_edges(height["x"])))
-    figure, axes = style.new_panels(4, 2, (2.4, 2.4 * float(np.clip(ratio, 0.6, 1.6))), between=1.65)
+    along_x, along_y = map(np.ptp, cell_edges(height))
+    figure, axes = style.new_panels(4, 2, (2.4, 2.4 * float(np.clip(along_y / along_x, 0.6, 1.6))), between=1.65)
     on_map, profile, heights, spectrum = axes
     image = draw_map(on_map, drawn(height), unit, Normalize(float(unit(low)), float(unit(high))))
     style.colour_bar(image, [on_map], unit.label("Height"), extend="both")

@@ -129,13 +129,39 @@ def in_metres(numbers: Any, name: str) -> np.ndarray:
 
 
 def spacing(h: xr.DataArray | xr.Dataset, step: str = "spacing") -> tuple[float, float]:
-    """Return the cell sides (dx, dy) of a grid [m]; raise :class:`InputError` if a coordinate has unequal steps."""
+    """Return the cell sides (dx, dy) of a grid, the steps between the centres; a single cell begins at zero. [m]
+
+    Parameters
+    ----------
+    h : DataArray or Dataset
+        Grid with the centres of its cells as coordinates ``x`` and ``y``.
+    step : str
+        Name of the calling step, for messages.
+
+    Raises
+    ------
+    InputError
+        If a coordinate is absent or not finite, its steps are not equal and positive, or the centre of a single cell is
+        not above zero.
+
+    Examples
+    --------
+    >>> spacing(xr.Dataset(coords={"x": [1.0, 3.0, 5.0], "y": [1.0]}))
+    (2.0, 2.0)
+    """
     sides = []
     for axis in ("x", "y"):
         if axis not in h.coords:
             raise InputError(f"{step}: the grid has no coordinate {axis!r}: expected cell centres in metres")
         name = f"{step}: coordinate {axis!r}"
-        sides.append(cell_side(in_metres(h[axis], name), name))
+        at, side = in_metres(h[axis], name), 0.0
+        if at.ndim == 1 and at.size and np.isfinite(at).all():
+            side = float(f"{(at[-1] - at[0]) / (at.size - 1):.15g}") if at.size > 1 else 2 * float(at[0])
+        if not (side > 0 and (np.abs(np.diff(at) - side) <= 1e-4 * side).all()):
+            found = f"{at.size} centres of {at.dtype}, like {at.ravel()[:3]}, not finite and in equal, ascending steps"
+            expected = "a uniform, ascending grid, or half the side of a single cell"
+            raise InputError(f"{name} has {found}: expected {expected}")
+        sides.append(side)
     return sides[0], sides[1]
 
 
@@ -144,56 +170,50 @@ def nominal_area(h: xr.DataArray | xr.Dataset) -> float:
     return h.sizes["x"] * h.sizes["y"] * math.prod(spacing(h, "height"))
 
 
-def cell_side(centres: Any, name: str = "the coordinate") -> float:
-    """Return the side of the equal cells of an axis: the step between their centres; a single cell begins at zero.
+def cell_edges(h: xr.DataArray | xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Return the borders of the cells along x and along y, one more than cells. [m]
+
+    Examples
+    --------
+    >>> cell_edges(xr.Dataset(coords={"x": [1.0, 3.0], "y": [1.0]}))
+    (array([0., 2., 4.]), array([0., 2.]))
+    """
+    edges = []
+    for axis, side in zip("xy", spacing(h), strict=True):
+        centres = h[axis].values
+        ends = np.append(centres - side / 2, centres[-1] + side / 2)
+        ends[np.abs(ends) < 1e-9 * side] = 0.0  # removes rounding where the grid begins
+        edges.append(ends)
+    return edges[0], edges[1]
+
+
+def squared_slopes(h: xr.DataArray, periodic: bool = False, depth: float = math.inf) -> np.ndarray:
+    """Return the squared slopes at the corners of three present points, (i, j), (i+1, j), (i, j+1). [-]
 
     Parameters
     ----------
-    centres : array_like, shape (n,)
-        Centres of the cells, ascending. [m]
-    name : str
-        Name of the numbers, for messages.
+    h : xarray.DataArray, dims (x, y)
+        Heights, NaN where missing. [m]
+    periodic : bool
+        Whether differences are also taken across the border.
+    depth : float
+        A corner counts if its highest point is at most this far below the highest point of all. [m]
 
     Returns
     -------
-    float
-        The side. [m]
-
-    Raises
-    ------
-    InputError
-        If `centres` is empty, a number is not finite, the steps are not equal and positive, or the centre of a
-        single cell is not above zero.
-
-    Examples
-    --------
-    >>> cell_side([1.0, 3.0, 5.0]), cell_side([1.0])
-    (2.0, 2.0)
+    ndarray, shape (corners,)
+        A single NaN if no corner counts.
     """
-    at = np.asarray(centres)
-    if at.dtype.kind in "fiu" and at.ndim == 1 and at.size and np.isfinite(at).all():
-        if at.size == 1 and at[0] > 0:
-            return 2 * float(at[0])
-        d = float(at[-1] - at[0]) / max(at.size - 1, 1)
-        if d > 0 and (np.abs(np.diff(at) - d) <= 1e-4 * d).all():
-            return float(f"{d:.15g}")
-    found = f"{at.size} centres of {at.dtype}, like {at[:3]}, not finite and in equal, ascending steps"
-    raise InputError(f"{name} has {found}: expected a uniform, ascending grid, or half the side of a single cell")
-
-
-def cell_edges(centres: Any) -> np.ndarray:
-    """Return the borders of the equal cells of an axis, one more than cells. [m]
-
-    Examples
-    --------
-    >>> cell_edges([1.0, 3.0]), cell_edges([1.0])
-    (array([0., 2., 4.]), array([0., 2.]))
-    """
-    at = np.asarray(centres, dtype=float)
-    side = cell_side(at)
-    edges = np.append(at - side / 2, at[-1] + side / 2)
-    edges[np.abs(edges) < 1e-9 * side] = 0.0  # removes rounding where the grid begins
-    return edges
+    (dx, dy), (nx, ny) = spacing(h), h.shape
+    beyond = (0, int(periodic or nx == 1)), (0, int(periodic or ny == 1))  # a strip one cell wide repeats too
+    z = np.pad(h.values, beyond, mode="wrap")
+    slope_x, slope_y = (z[1:, :-1] - z[:-1, :-1]) / dx, (z[:-1, 1:] - z[:-1, :-1]) / dy
+    squares = slope_x**2 + slope_y**2
+    counts = np.isfinite(squares)
+    if depth < math.inf:
+        lowest = np.nanmax(h.values) - depth
+        counts &= np.maximum(np.maximum(z[1:, :-1], z[:-1, 1:]), z[:-1, :-1]) >= lowest
+    return squares[counts] if counts.any() else np.array([np.nan])
 
 
 def noted(h: xr.DataArray, line: str, **attrs: Any) -> xr.DataArray:

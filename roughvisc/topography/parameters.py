@@ -7,7 +7,7 @@ import math
 import numpy as np
 import xarray as xr
 
-from roughvisc.topography.grid import checked, require_heights, spacing
+from roughvisc.topography.grid import checked, require_heights, squared_slopes
 
 #: name -> (units, long name)
 PARAMETERS = {
@@ -56,7 +56,7 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
     h = checked(h, "parameters", least=1)
     require_heights(h, "parameters")
     known = h.values[np.isfinite(h.values)]
-    z, gradient = known - known.mean(), _squared_slopes(h, periodic)
+    z, gradient = known - known.mean(), squared_slopes(h, periodic)
     square = (z**2).mean()
     with np.errstate(invalid="ignore", divide="ignore"):
         values = {
@@ -73,35 +73,6 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
     return xr.Dataset({name: ((), float(value), declared[name]) for name, value in values.items()})
 
 
-def rms_slope(h: xr.DataArray, periodic: bool = False, depth: float = math.inf) -> float:
-    """Return the root mean square slope, Sdq of :func:`parameters`, within a depth of the highest point.
-
-    Parameters
-    ----------
-    h : xarray.DataArray
-        Height over (x, y), NaN where missing. [m]
-    periodic : bool
-        Whether differences are also taken across the border.
-    depth : float
-        A corner of three neighbouring points counts if its highest point is not deeper. [m]
-
-    Returns
-    -------
-    float
-        NaN if no corner counts. [-]
-    """
-    return math.sqrt(_squared_slopes(checked(h, "rms_slope", least=1), periodic, depth).mean())
-
-
-def _squared_slopes(h: xr.DataArray, periodic: bool, depth: float = math.inf) -> np.ndarray:
-    """Return the squared slopes at the corners of three present points, (i, j), (i+1, j), (i, j+1); NaN without one."""
-    (dx, dy), (nx, ny) = spacing(h), h.shape
-    beyond = (0, int(periodic or nx == 1)), (0, int(periodic or ny == 1))  # a strip one cell wide repeats too
-    z = np.pad(h.values, beyond, mode="wrap")
-    slope_x, slope_y = (z[1:, :-1] - z[:-1, :-1]) / dx, (z[:-1, 1:] - z[:-1, :-1]) / dy
-    squares = slope_x**2 + slope_y**2
-    counts = np.isfinite(squares)
-    if depth < math.inf:
-        lowest = np.nanmax(h.values) - depth
-        counts &= np.maximum(np.maximum(z[1:, :-1], z[:-1, 1:]), z[:-1, :-1]) >= lowest
-    return squares[counts] if counts.any() else np.array([np.nan])
+def rms_slope(h: xr.DataArray, periodic: bool = False) -> float:
+    """Return the root mean square slope, Sdq of :func:`parameters`; NaN if no three neighbouring points are present."""
+    return math.sqrt(squared_slopes(checked(h, "rms_slope", least=1), periodic).mean())

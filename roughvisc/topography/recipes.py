@@ -279,9 +279,28 @@ _INDENTERS: dict[str, Callable[..., np.ndarray]] = {
 }
 
 
-def is_indenter(h: xr.DataArray) -> bool:
-    """Return whether a surface is a sphere, cone or flat punch on cells of its grid, so that the grid can grow."""
-    return _known(h) is not None
+def indenter_of(h: xr.DataArray) -> tuple[Callable[..., np.ndarray], tuple[float, float], tuple[float, float]] | None:
+    """Return the profile of a sphere, cone or flat punch: height as a function of x and y from the apex. [m]
+
+    With it, the cell sides and the position of the apex. [m] None if the recipe does not reproduce the heights on cells
+    of its grid. xarray keeps attributes through arithmetic, so that the recipe alone does not count.
+    """
+    try:
+        recipe = json.loads(h.attrs["recipe"])
+        evaluate = partial(_INDENTERS[recipe["name"]], **recipe["parameters"])
+        (width, depth), (nx, ny) = recipe["size"], recipe["shape"]
+        cell, centre = (width / nx, depth / ny), (width / 2, depth / 2)
+        expected = evaluate(h["x"].values[:, None] - centre[0], h["y"].values - centre[1])
+    except (KeyError, TypeError, ValueError, IndexError, ZeroDivisionError, AttributeError):
+        return None
+    for axis, side in zip("xy", cell, strict=True):
+        at = h[axis].values / side - 0.5
+        if np.abs(at - round(at[0]) - np.arange(at.size)).max() > 1e-6:
+            return None
+    near = 1e-9 * np.nanmax(np.abs(expected), initial=0.0)
+    if not np.allclose(h.transpose("x", "y").values, expected, rtol=0, atol=near, equal_nan=True):
+        return None
+    return evaluate, cell, centre
 
 
 def grown(h: xr.DataArray, factor: float = 1.5) -> xr.DataArray | None:
@@ -297,9 +316,9 @@ def grown(h: xr.DataArray, factor: float = 1.5) -> xr.DataArray | None:
     Returns
     -------
     xarray.DataArray or None
-        None if `h` is not a sphere, cone or flat punch, see :func:`is_indenter`.
+        None if `h` is not a sphere, cone or flat punch, see :func:`indenter_of`.
     """
-    known = _known(h)
+    known = indenter_of(h)
     if known is None:
         return None
     evaluate, cell, centre = known
@@ -315,7 +334,7 @@ def grown(h: xr.DataArray, factor: float = 1.5) -> xr.DataArray | None:
 
 def remade(h: xr.DataArray, shape: tuple[int, int]) -> xr.DataArray | None:
     """Return the same indenter on another number of cells over its domain; None if `h` is not an indenter. [m]"""
-    if not is_indenter(h):
+    if indenter_of(h) is None:
         return None
     recipe = json.loads(h.attrs["recipe"])
     return _indenter(recipe["name"], recipe["parameters"], recipe["size"], shape)
@@ -337,37 +356,13 @@ def highest(h: xr.DataArray) -> float:
     >>> highest(tip), float(tip.max()) < -0.3, highest(tip + 1.0) == float(tip.max()) + 1.0
     (0.0, True, True)
     """
-    known, highest_cell = _known(h), float(np.nanmax(h.values))
+    known, highest_cell = indenter_of(h), float(np.nanmax(h.values))
     if known is None:
         return highest_cell
     for axis, side, centre in zip("xy", *known[1:], strict=True):
         if not float(h[axis][0]) - side / 2 <= centre <= float(h[axis][-1]) + side / 2:
             return highest_cell
     return 0.0
-
-
-def _known(h: xr.DataArray) -> tuple[Callable[..., np.ndarray], tuple[float, float], tuple[float, float]] | None:
-    """Return height as a function of x and y from the apex, cell sides, and position of the apex. [m]
-
-    None if the recipe does not reproduce the heights on cells of its grid. xarray keeps attributes through arithmetic,
-    so that the recipe alone does not count.
-    """
-    try:
-        recipe = json.loads(h.attrs["recipe"])
-        evaluate = partial(_INDENTERS[recipe["name"]], **recipe["parameters"])
-        (width, depth), (nx, ny) = recipe["size"], recipe["shape"]
-        cell, centre = (width / nx, depth / ny), (width / 2, depth / 2)
-        expected = evaluate(h["x"].values[:, None] - centre[0], h["y"].values - centre[1])
-    except (KeyError, TypeError, ValueError, IndexError, ZeroDivisionError, AttributeError):
-        return None
-    for axis, side in zip("xy", cell, strict=True):
-        at = h[axis].values / side - 0.5
-        if np.abs(at - round(at[0]) - np.arange(at.size)).max() > 1e-6:
-            return None
-    near = 1e-9 * np.nanmax(np.abs(expected), initial=0.0)
-    if not np.allclose(h.transpose("x", "y").values, expected, rtol=0, atol=near, equal_nan=True):
-        return None
-    return evaluate, cell, centre
 
 
 # ------------------------------------------------------------------------------------------------------ random surfaces
@@ -508,7 +503,7 @@ def is_analytic(h: xr.DataArray) -> bool:
     >>> is_analytic(ball), is_analytic(ball + 1e-6), is_analytic(wavy(1e-6, 1e-3, 1e-3, 8))
     (True, False, True)
     """
-    return is_indenter(h) or recipe_name(h) == "wavy"
+    return indenter_of(h) is not None or recipe_name(h) == "wavy"
 
 
 def cells(shape: Any, least: int = 1) -> tuple[int, int]:
