@@ -118,32 +118,26 @@ class Sliding:
         (nx, ny), (dx, dy) = shape, spacing
         #: Wave numbers along x and along y, of a real transform. [1/m]
         self.qx, self.qy = 2 * math.pi * fft.fftfreq(nx, dx)[:, None], 2 * math.pi * fft.rfftfreq(ny, dy)[None, :]
-        odd, odd_across = self.qx.copy(), self.qy.copy()  # the shortest wave of an even number of cells has zero slope
-        if nx % 2 == 0:
-            odd[nx // 2] = 0
-        if ny % 2 == 0:
-            odd_across[:, -1] = 0
-        self._derivatives = xp.asarray(1j * odd), xp.asarray(1j * odd_across)
         response, complex_compliance = body.waves(self.qx, self.qy, -self.qx * speed)
-        acting, complex_compliance = response > 0, np.broadcast_to(complex_compliance, response.shape)
-        endless = acting & ~np.isfinite(complex_compliance)
-        if endless.any():
-            # waves across the motion do not move in the material
+        complex_compliance = np.where(response > 0, complex_compliance, 0.0)
+        if not np.isfinite(complex_compliance).all():  # of waves across the motion, which do not move in the material
             expected = "a solid, because this material creeps without end, or a profile uniform across the motion"
             raise InputError(key="material", found=body.materials, expected=expected)
-        # On an even grid the sine of the shortest wave vanishes at the cell centres.
-        skew = 1j * (np.where(acting & (odd != 0), complex_compliance.imag, 0.0) * response)
-        displaced = np.where(acting, complex_compliance.real, 0.0) * response + skew
-        softest, acts = np.abs(displaced).max(), displaced != 0
+        skew = 1j * (complex_compliance.imag * response)
+        across = self.qy.copy()
+        if nx % 2 == 0:  # the sine of the shortest wave vanishes at the centres of an even number of cells
+            skew[nx // 2] = 0
+        if ny % 2 == 0:
+            across[:, -1] = 0
+        self._derivatives = xp.asarray(1j * self.qx), xp.asarray(1j * across)
+        displaced = complex_compliance.real * response + skew
         # Pressure over displacement of each wave; waves without displacement count as the softest. [Pa/m]
-        stiffness = np.divide(1.0, displaced, where=acts, out=np.full(acts.shape, 1 / softest, complex))
+        stiffness = 1 / np.where(displaced == 0, np.abs(displaced).max(), displaced)
         stiffest = float(np.abs(stiffness).max())
         #: Displacement over pressure of each wave. [m/Pa]
         self.response = xp.asarray(displaced)
         self._skew = xp.asarray(skew)
         self._stiffness = xp.asarray((stiffness / stiffest).astype(np.complex64)), stiffest
-        #: Cells of one period.
-        self.shape = shape
         self._transforms = transforms(threads_of(nx * ny), xp)
         #: Number of convolutions so far, including the preconditioner.
         self.convolutions = 0
@@ -192,7 +186,7 @@ class Sliding:
         self.convolutions += 1
         waves = self._transforms.waves(field)
         waves *= symbol
-        return self._transforms.waves_back(waves, self.shape)
+        return self._transforms.waves_back(waves, field.shape)
 
 
 def steady_state(
@@ -229,30 +223,37 @@ def steady_state(
         return SteadyState(pressure, opening - gap, float(opening.mean()), 0.0, 0.0, 0.0)
     approach = float(opening.min()) - _START * float(xp.ptp(opening))
     separation = opening - approach
-    errors = [math.inf]
+    errors = math.inf, math.inf
     for iteration in range(max_iterations + 1):
         products = float((pressure * separation).sum())
         energy = sliding.self_influence * float((pressure**2).sum())
         enough = _FORCING * min(math.sqrt(products), products / math.sqrt(energy))
         diagonal = separation / pressure
         system = _NewtonSystem(sliding, diagonal)
-
-        # Predictor: Newton's step to the solution. It gives the error of the pressure restricted to the contact.
-        right = approach - opening
-        step, approach_step, is_accurate = system.solve(right, enough)
-        if not math.isfinite(float(step.sum())):  # the tolerance is below rounding
-            raise ConvergenceError(unsolved(iteration, max(errors), tolerance))
         contact = (pressure * sliding.self_influence > separation) | (separation == separation.min())
         found = xp.where(contact, pressure, 0.0)
         found *= total / float(found.sum())
-        force, *errors = _friction_and_errors(sliding, found, pressure + step - found)
-        if max(errors) <= tolerance:
-            step, approach_step, is_accurate = system.solve(right, enough, _STATED, start=step)
-            force, *errors = _friction_and_errors(sliding, found, pressure + step - found)
-        if max(errors) <= tolerance and is_accurate:
-            break
-        if iteration == max_iterations:
-            raise ConvergenceError(unsolved(iteration, max(errors), tolerance))
+
+        # Predictor: Newton's step to the solution, which gives the error of the pressure restricted to the contact. To
+        # first order, this correction changes the force by twice its sum over the slope. If the errors are below the
+        # tolerance, an accurate step gives the stated ones.
+        right = approach - opening
+        step: Array = None
+        for relative in (_LOOSEST, _STATED):
+            step, approach_step, is_accurate = system.solve(right, enough, relative, step)
+            if not math.isfinite(float(step.sum())):  # the tolerance is below rounding
+                raise ConvergenceError(unsolved(iteration, max(errors), tolerance))
+            correction, slope = pressure + step - found, sliding.slope(found)
+            force, change = (-float((part * slope).sum()) * sliding.cell_area for part in (found, 2 * correction))
+            of_force = _CAUTION * abs(change) / abs(force + change) if change else 0.0
+            errors = _CAUTION * float(abs(correction).sum() / found.sum()), of_force
+            if max(errors) > tolerance:
+                break
+        else:
+            if is_accurate:
+                displacement = sliding.displacement(found)
+                approach = float((found * (gap + displacement)).sum()) / total
+                return SteadyState(found, displacement, approach, force, *errors)
         widening = -separation - diagonal * step
         length = min(_longest(pressure, step), _longest(separation, widening))
         reached = float(((pressure + length * step) * (separation + length * widening)).sum())
@@ -269,9 +270,7 @@ def steady_state(
         separation += length * widening
         approach += length * (approach_step + approach_added)
         opening = gap + sliding.displacement(pressure)
-    displacement = sliding.displacement(found)
-    approach = float((found * (gap + displacement)).sum()) / total
-    return SteadyState(found, displacement, approach, force, *errors)
+    raise ConvergenceError(unsolved(iteration, max(errors), tolerance))
 
 
 class _NewtonSystem:
@@ -366,7 +365,7 @@ def gmres(operator: Callable[[Array], Array], right: Array, enough: float) -> tu
     Returns
     -------
     array
-        The solution, or the last iterate after 300 vectors.
+        The solution, or the last iterate after 300 or more vectors.
     int
         Number of vectors.
 
@@ -401,7 +400,7 @@ def gmres(operator: Callable[[Array], Array], right: Array, enough: float) -> tu
             residual = residual - along_residual[k] * directions[k + 1]
             norm = math.sqrt(float(xp.einsum("i,i->", residual, residual)))
             count += 1
-            if norm <= enough or count == _MOST_VECTORS:
+            if norm <= enough:
                 break
         if size == 0:
             break
@@ -414,15 +413,3 @@ def _longest(values: Array, step: Array) -> float:
     """Return the largest fraction of a step, at most 1, after which positive values are not negative."""
     shrinking = namespace(step).flatnonzero(step < 0)
     return min(1.0, float((values.take(shrinking) / -step.take(shrinking)).min())) if shrinking.size else 1.0
-
-
-def _friction_and_errors(sliding: Sliding, pressure: Array, correction: Array) -> tuple[float, float, float]:
-    """Return the friction force of a pressure [N], and the estimated errors of both (note 3).
-
-    The correction changes the force by twice its sum over the slope, to first order.
-    """
-    slope = sliding.slope(pressure)
-    force = -float((pressure * slope).sum()) * sliding.cell_area
-    change = -float((2 * correction * slope).sum()) * sliding.cell_area
-    pressure_error = _CAUTION * float(abs(correction).sum() / pressure.sum())
-    return force, pressure_error, _CAUTION * abs(change) / abs(force + change) if change else 0.0
