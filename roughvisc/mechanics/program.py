@@ -11,10 +11,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import Any, Literal, get_args
-
-import numpy as np
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
@@ -63,11 +61,11 @@ class Slide:
             If the distance is less than half a cell.
         """
         side = spacing[self.axis]
-        number = math.floor(self.distance / side * (1 + 1e-12) + 0.5)
-        if number < 1:
+        count = math.floor(self.distance / side * (1 + 1e-12) + 0.5)
+        if count < 1:
             least = f"at least half a cell of {format_quantity(side, 'm')}, or a finer grid"
             raise InputError(key="slide", found=self.distance, expected=least)
-        return number
+        return count
 
 
 def instant(began: float, end: float, taken: int, cells: int) -> float:
@@ -137,14 +135,12 @@ class Segment:
 
     def value(self, elapsed: float, start: float) -> float:
         """Return the prescribed value at a time after the start [s]; ``start`` is the value at the start. [N or m]"""
+        end = start if self.end is None else self.end
         if self.amplitude:
-            mean = start if self.end is None else self.end
-            return mean + self.amplitude * math.sin(2 * math.pi * elapsed / self.period)
-        if self.end is None:
-            return start
+            return end + self.amplitude * math.sin(2 * math.pi * elapsed / self.period)
         if elapsed >= self.duration * (1 - 1e-12):  # times are sums of durations, rounded
-            return self.end
-        return start + (self.end - start) * (elapsed / self.duration)
+            return end
+        return start + (end - start) * (elapsed / self.duration)
 
     def turns(self, after: float, before: float) -> list[float]:
         """Return the turning points of a cycle strictly between two times since its start. [s]"""
@@ -158,13 +154,7 @@ class Segment:
         """Return the largest prescribed value of the segment; ``start`` is the value at the start. [N or m]"""
         return max(start, start if self.end is None else self.end) + abs(self.amplitude)
 
-    def is_nothing(self, start: float) -> bool:
-        """Return whether the prescribed value is zero throughout; ``start`` is the value at the start."""
-        return not self.amplitude and start == 0 and not self.end
 
-
-#: Largest number of cycles.
-MOST_CYCLES = 1e6
 # Segments that the text of a program lists.
 _LISTED = 8
 
@@ -208,13 +198,10 @@ class Program:
             words.append(f"and {more} more segments, {format_quantity(self.duration, 's')} in all")
         return f"Program: {', '.join(words) or 'nothing'}"
 
-    def _then(self, *segments: Segment) -> Program:
-        return replace(self, segments=self.segments + segments)
-
     def _to(self, control: Control, value: Any, over: Any) -> Program:
         """Ramp linearly to a value of a controlled quantity."""
         end = number(value, UNITS[control], control, least=LEAST.get(control))
-        return self._then(Segment(control, number(over, "s", "over", least=0), end))
+        return self + Program((Segment(control, number(over, "s", "over", least=0), end),))
 
     def __add__(self, other: Program) -> Program:
         """Return this program followed by another one."""
@@ -320,7 +307,7 @@ class Program:
         if control is None:
             control = self.segments[-1].control if self.segments else "load"
         kept = one_of("control", control, UNITS)
-        return self._then(Segment(kept, number(duration, "s", "hold", least=0)))
+        return self + Program((Segment(kept, number(duration, "s", "hold", least=0)),))
 
     def slide(
         self,
@@ -364,7 +351,7 @@ class Program:
             over = far / number(speed, "m/s", "speed", above=0)
         lasting = number(over, "s", "over", above=0)
         control = self.segments[-1].control if self.segments else "load"
-        return self._then(Segment(control, lasting, slide=Slide(far, direction)))
+        return self + Program((Segment(control, lasting, slide=Slide(far, direction)),))
 
     @classmethod
     def table(
@@ -396,12 +383,12 @@ class Program:
         ends = [number(value, unit, f"values.{row}", least=LEAST.get(control)) for row, value in enumerate(values)]
         if instants[0] != 0:
             raise InputError(key="times.0", found=times[0], expected="zero")
-        segments = [Segment(control, 0.0, ends[0])] if ends[0] else []
-        for row, (before, now) in enumerate(pairwise(instants), 1):
-            if not now >= before:
+        segments = []
+        for row, (before, now) in enumerate(pairwise([0.0, *instants])):
+            if now < before:
                 raise InputError(key=f"times.{row}", found=times[row], expected=f"at least {before!r} s")
             segments.append(Segment(control, now - before, ends[row]))
-        return cls(tuple(segments), note)
+        return cls(tuple(segments if ends[0] else segments[1:]), note)
 
     @classmethod
     def cycle(
@@ -438,7 +425,7 @@ class Program:
         if control in LEAST and abs(height) > middle:
             raise InputError(key="amplitude", found=amplitude, expected=f"at most the mean, {mean!r}")
         length = number(period, "s", "period", above=0)
-        duration = number(length * number(cycles, "1", "cycles", above=0, most=MOST_CYCLES), "s", "cycles")
+        duration = number(length * number(cycles, "1", "cycles", above=0, most=1e6), "s", "cycles")
         return cls((Segment(control, 0.0, middle), Segment(control, duration, middle, height, length)))
 
     def on_area(self, area: Quantity) -> Program:
@@ -460,7 +447,7 @@ class Program:
                 end = None if one.end is None else float(f"{one.end * size:.15g}")
                 one = replace(one, control="load", end=end, amplitude=float(f"{one.amplitude * size:.15g}"))
             segments.append(one)
-        return self if tuple(segments) == self.segments else replace(self, segments=tuple(segments))
+        return replace(self, segments=tuple(segments))
 
     @cached_property
     def slides(self) -> bool:
@@ -498,19 +485,13 @@ class Program:
     @cached_property
     def corners(self) -> list[float]:
         """Start of the program and end of each segment. [s]"""
-        corners = [0.0]
-        for segment in self.segments:
-            corners.append(corners[-1] + segment.duration)
-        return corners
+        return list(accumulate((segment.duration for segment in self.segments), initial=0.0))
 
     @cached_property
     def largest_load(self) -> float:
         """Largest load prescribed anywhere; zero if none is. A nominal pressure has no load without an area. [N]"""
-        largest = 0.0
-        for segment in self.segments:
-            if segment.control == "load":
-                largest = max(largest, (segment.end or 0.0) + abs(segment.amplitude))
-        return largest
+        loads = (segment for segment in self.segments if segment.control == "load")
+        return max([0.0, *((one.end or 0.0) + abs(one.amplitude) for one in loads)])
 
     @cached_property
     def time_scale(self) -> float:
@@ -519,18 +500,16 @@ class Program:
         A jump counts as long as the segment after it: it represents a change that is fast for the material, but slow
         for elastic waves. A ramp from a computed value counts from zero.
         """
-        sizes: dict[str, float] = {}
+        sizes, before = dict.fromkeys(UNITS, 0.0), dict.fromkeys(UNITS, 0.0)
         for one in self.segments:
-            sizes[one.control] = max(sizes.get(one.control, 0.0), abs(one.end or 0.0) + abs(one.amplitude))
-        scales, before, jumped = [np.inf], {"load": 0.0, "pressure": 0.0, "approach": 0.0}, False
+            sizes[one.control] = max(sizes[one.control], abs(one.end or 0.0) + abs(one.amplitude))
+        scales, jumped = [math.inf], False
         for one in self.segments:
-            change = 0.0 if one.end is None else abs(one.end - before[one.control])
-            before[one.control] = before[one.control] if one.end is None else one.end
-            if one.duration == 0:
-                jumped = jumped or change > 0
-                continue
-            rate = change / one.duration + 2 * np.pi * abs(one.amplitude) / one.period
-            scales += [sizes[one.control] / rate] if rate > 0 else []
-            scales += [one.duration] if jumped else []
-            jumped = False
-        return float(min(scales))
+            end = before[one.control] if one.end is None else one.end
+            change, before[one.control] = abs(end - before[one.control]), end
+            if one.duration > 0:
+                rate = change / one.duration + 2 * math.pi * abs(one.amplitude) / one.period
+                scales += [sizes[one.control] / rate] if rate > 0 else []
+                scales += [one.duration] if jumped else []
+            jumped = one.duration == 0 and (jumped or change > 0)
+        return min(scales)

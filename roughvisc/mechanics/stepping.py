@@ -884,7 +884,7 @@ def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> 
     """Return the time until which open surfaces stay apart; the present time if they touch immediately. [s]"""
     here, now, began = state.fine, state.fine.time, scene.program.corners[state.segment]
     if segment.control == "load":
-        return event if segment.is_nothing(here.start) else now
+        return event if segment.highest(here.start) == 0 else now
     if segment.highest(here.start) <= scene.lowest(scene.gap):  # the surface recovers to its undeformed shape
         return event
 
