@@ -13,13 +13,13 @@ from roughvisc.errors import TooLargeError as TooLargeError
 from roughvisc.mechanics import closed_forms as closed_forms
 from roughvisc.mechanics.body import Body as Body
 from roughvisc.mechanics.layer import layer as layer
+from roughvisc.mechanics.materials.creep import Prony as Prony
 from roughvisc.mechanics.materials.creep import arrhenius as arrhenius
 from roughvisc.mechanics.materials.creep import creep as creep
 from roughvisc.mechanics.materials.creep import pair as pair
 from roughvisc.mechanics.materials.creep import power_law as power_law
 from roughvisc.mechanics.materials.creep import shift as shift
 from roughvisc.mechanics.materials.creep import wlf as wlf
-from roughvisc.mechanics.materials.prony import Prony as Prony
 from roughvisc.mechanics.materials.prony import elastic as elastic
 from roughvisc.mechanics.materials.prony import from_relaxation as from_relaxation
 from roughvisc.mechanics.materials.prony import kelvin_voigt as kelvin_voigt

@@ -21,7 +21,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import fft
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.creep import Material, check_material, complex_compliance, over_frequencies
+from roughvisc.mechanics.materials.creep import Material, check_material
+from roughvisc.mechanics.materials.series import complex_compliance, over_frequencies
 from roughvisc.mechanics.quadrature import rule
 
 Array = NDArray[np.float64]

@@ -24,8 +24,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel, cell_mean, check_one_body, corner_sum, love_kernel
-from roughvisc.mechanics.materials.creep import Material, laplace_compliance, lattice, nonnegative, over_frequencies
-from roughvisc.mechanics.materials.prony import Prony
+from roughvisc.mechanics.materials.creep import Material, Prony
+from roughvisc.mechanics.materials.series import laplace_compliance, lattice, nonnegative, over_frequencies
 from roughvisc.units import Quantity, format_quantity, quantities
 
 Array = NDArray[np.float64]

@@ -32,8 +32,8 @@ import numpy as np
 from roughvisc.mechanics.body import Body, wave_limits
 from roughvisc.mechanics.grid import Grid, namespace
 from roughvisc.mechanics.layer import LayeredBody, LayerSeries, layer_series
-from roughvisc.mechanics.materials.creep import Material, series
-from roughvisc.mechanics.materials.prony import Prony, one_less_mean_decay
+from roughvisc.mechanics.materials.creep import Material, Prony, one_less_mean_decay
+from roughvisc.mechanics.materials.series import series
 
 Array = Any  # an array of NumPy or CuPy
 Rule = Literal["linear", "bdf2", "constant"]

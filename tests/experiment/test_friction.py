@@ -9,7 +9,7 @@ from support import refused
 
 import roughvisc as rv
 from roughvisc.mechanics import steady_sliding
-from roughvisc.mechanics.materials.creep import complex_compliance
+from roughvisc.mechanics.materials.series import complex_compliance
 from roughvisc.variables import STATUS_MEANINGS, VARIABLES
 
 ROUGH = rv.self_affine((1e-3, 0.8e-3), (40, 36), hurst=0.8, rms_slope=0.1, rolloff=4e-4, seed=1)

@@ -10,7 +10,7 @@ from support import displaced
 import roughvisc as rv
 from roughvisc.mechanics.body import HALF_SPACE, Body
 from roughvisc.mechanics.grid import Grid
-from roughvisc.mechanics.materials.creep import complex_compliance
+from roughvisc.mechanics.materials.series import complex_compliance
 from roughvisc.mechanics.memory import Memory
 from roughvisc.mechanics.steady_sliding import Sliding, steady_state
 from roughvisc.mechanics.stepping import Scene, march

@@ -9,7 +9,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.special import erf
 
 from roughvisc.mechanics.body import HALF_SPACE, Body
-from roughvisc.mechanics.materials.creep import complex_compliance
+from roughvisc.mechanics.materials.series import complex_compliance
 from roughvisc.mechanics.sheet import Sheet
 from roughvisc.mechanics.steady_sliding import Sliding
 from roughvisc.observables.theory import friction_of_waves

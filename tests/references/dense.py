@@ -4,7 +4,7 @@ import numpy as np
 
 import roughvisc as rv
 from roughvisc.mechanics.body import HALF_SPACE, Body
-from roughvisc.mechanics.materials.creep import complex_compliance
+from roughvisc.mechanics.materials.series import complex_compliance
 from roughvisc.mechanics.steady_sliding import Sliding, steady_state
 
 PERIOD, TIME = 1e-3, 1e-3

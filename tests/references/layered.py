@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from references.dense import settled
 from references.half_space import pressure_of_springs
 from roughvisc.mechanics.layer import effective_compliance
-from roughvisc.mechanics.materials.creep import laplace_compliance
+from roughvisc.mechanics.materials.series import laplace_compliance
 from roughvisc.mechanics.sheet import reduction
 
 # ----------------------------------------------------------------------------------------------------------- waves

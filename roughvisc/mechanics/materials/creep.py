@@ -1,60 +1,152 @@
-"""Materials given by a creep function, pairs of bodies, temperature, and the certified exponential series.
+"""Linear viscoelastic materials: creep as a series of exponentials or as a function, pairs of bodies, temperature.
 
-A creep function is not negative and does not decrease. For a passive material it is a sum of positive exponentials. The
-solver uses the Prony series that :func:`series` fits to any material for the times of the program, with a measured
-error.
+The half-space enters the contact through one function, the contact compliance
+``C(t) = 1/E*(t) = (1 - nu) J(t) / 2`` with the shear creep compliance ``J``; two deformable bodies add theirs.
 
-The terms of a series are positive, so that it is a passive material. It has the instantaneous compliance of the
-material, so that jumps are exact. Both compliances increase. Before the shortest time they therefore differ by less
-than the creep up to this time.
-
-Under oscillating pressure a material has a complex compliance. Series and power laws have it in closed form. Any other
-material is replaced by a certified series.
+A creep function is not negative and does not decrease. For a passive material it is a sum of positive exponentials.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
-import scipy  # which imports a submodule when it is first used: scipy.optimize takes 0.2 s
 from numpy.typing import ArrayLike, NDArray
 from scipy.constants import R as GAS_CONSTANT
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.prony import Prony, check_poisson
 from roughvisc.mechanics.quadrature import panels
 from roughvisc.units import Quantity, number, quantities
 
 Array = NDArray[np.float64]
 
-#: Largest relative decrease of a creep function that counts as rounding.
-_ROUNDING = 1e-9
 #: Largest shift factor; its inverse is the smallest. Factors beyond result from a temperature in a wrong unit.
 LARGEST_SHIFT = 1e30
 #: Decimal logarithm of the largest factor of WLF and Arrhenius.
 _LARGEST = 300.0
-#: Number of times per decade at which a series is fitted, and at which its error is measured.
-_FITTED, _MEASURED = 30, 100
-#: Numbers of retardation times per decade to try in turn, and largest number of retardation times.
-_OFFERED, _MOST_OFFERED = (0.5, 0.7, 1, 1.5, 2, 3, 4, 6, 8, 12, 24, 48), 300
-#: Shortest time over the shortest retardation time, two values to try: the larger one gives a better fit before the
-#: shortest time, with more terms. Longest retardation time over the longest time.
-_FASTER, _SLOWER = (3.0, 10.0), 3.0
-#: Number of times that the rows are reweighted to level the error.
-_LEVELLINGS = 6
-#: Number of successive trials without a smaller error after which the fit ends.
-_IDLE = 3
-#: Terms whose part of the target is below this in all rows are left out.
-_UNSEEN = 1e-10
-#: Factor by which the times of a series must extend beyond the times of the frequencies, shorter and longer: a term
-#: whose time is a hundred times off contributes a hundredth of its loss.
-_BEYOND = 100.0
-#: Number of rows above which they are first reduced to a triangular factor.
-_MANY = 1000
+
+
+def check_poisson(poisson: float) -> None:
+    if not -1 < poisson <= 0.5:
+        raise InputError(key="poisson", found=poisson, expected="a number above -1 and up to 0.5")
+
+
+def check_terms(name: str, terms: Sequence[float], unit: str, times: Sequence[float]) -> None:
+    """Refuse terms of a series that are negative, or fewer or more than their times, which are positive."""
+    if len(terms) != len(times):
+        raise InputError(key=name, found=len(terms), expected=f"as many as times, {len(times)}")
+    for i, (term, time) in enumerate(zip(terms, times, strict=True)):
+        number(term, unit, f"{name}[{i}]", least=0)
+        number(time, "s", f"times[{i}]", above=0)
+
+
+@quantities(glassy="1/Pa >= 0", fluidity="1/(Pa s) >= 0", compliances="1/Pa", times="s")
+@dataclass(frozen=True)
+class Prony:
+    r"""Exponential (Prony) series of the shear creep compliance.
+
+    .. math:: J(t) = J_0 + \varphi t + \sum_i J_i \left(1 - e^{-t/\tau_i}\right)
+
+    Parameters
+    ----------
+    glassy : float or str
+        Instantaneous compliance ``J_0``; zero for a material without instantaneous response. [1/Pa]
+    fluidity : float or str
+        Inverse of the steady shear viscosity, zero for a solid. [1/(Pa s)]
+    compliances, times : sequence of float or str
+        Retarded compliances ``J_i`` [1/Pa] and retardation times ``tau_i`` [s].
+    poisson : float
+        Poisson ratio, constant in time.
+    note : str
+        Origin of a fitted series: number of terms, misfit. Ignored in comparisons.
+    stands_for : str
+        Name of the bodies if the series is not one body with this Poisson ratio; otherwise empty.
+    longest : float
+        Time of the last row of a creep table, up to which the series is known. [s]
+    warning : str
+        Warning about the measurements, for the result.
+    misfit : float
+        Largest relative deviation from the rows of a creep table, zero if it is within their noise.
+
+    Raises
+    ------
+    InputError
+        If a value is negative or not finite, a retardation time is not positive, the Poisson ratio lies
+        outside (-1, 0.5], or the material is rigid.
+    """
+
+    glassy: Quantity
+    fluidity: Quantity = 0.0
+    compliances: tuple[Quantity, ...] = ()
+    times: tuple[Quantity, ...] = ()
+    poisson: float = 0.5
+    note: str = field(default="", compare=False, repr=False)
+    stands_for: str = field(default="", compare=False, repr=False)
+    longest: float = field(default=math.inf, repr=False)
+    warning: str = field(default="", compare=False, repr=False)
+    misfit: float = field(default=0.0, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "compliances", tuple(map(float, self.compliances)))
+        object.__setattr__(self, "times", tuple(map(float, self.times)))
+        check_terms("compliances", self.compliances, "1/Pa", self.times)
+        check_poisson(self.poisson)
+        if self.glassy + self.fluidity + sum(self.compliances) == 0:
+            raise InputError(key="glassy", found=self.glassy, expected="a positive compliance, not a rigid material")
+
+    def creep_compliance(self, t: ArrayLike) -> Array:
+        """Return the shear creep compliance ``J(t)``, [1/Pa]; times beyond the longest one are refused. [s]"""
+        t = known_times(t, self.longest)
+        retarded = np.add.reduce(self.compliances * -np.expm1(-t[..., None] / np.array(self.times)), axis=-1)
+        flowed = self.fluidity * t if self.fluidity else 0.0  # a solid has a limit at inf
+        return np.asarray(self.glassy + flowed + retarded)
+
+    def contact_compliance(self, t: ArrayLike) -> Array:
+        """Return the contact compliance ``C(t) = (1 - nu) J(t) / 2``. [1/Pa]"""
+        return 0.5 * (1 - self.poisson) * self.creep_compliance(t)
+
+    def contact_integral(self, t: ArrayLike) -> Array:
+        """Return the integral ``int_0^t C``. [s/Pa]"""
+        t = known_times(t, self.longest)
+        crept = np.add.reduce(self.compliances * one_less_mean_decay(t[..., None] / np.array(self.times)), axis=-1) * t
+        return np.asarray(0.5 * (1 - self.poisson) * (self.glassy * t + self.fluidity * t**2 / 2 + crept))
+
+    def scaled(self, time_factor: float, modulus_factor: float, note: str = "") -> Prony:
+        """Return the series with all times multiplied by one factor and all moduli by another."""
+        return replace(
+            self,
+            glassy=self.glassy / modulus_factor,
+            fluidity=self.fluidity / (time_factor * modulus_factor),
+            compliances=tuple(one / modulus_factor for one in self.compliances),
+            times=tuple(time_factor * one for one in self.times),
+            longest=time_factor * self.longest,
+            note="; ".join(filter(None, (self.note, note))),
+        )
+
+
+def known_times(t: ArrayLike, longest: float) -> Array:
+    """Return times up to the longest one, beyond which a material is not known. [s]"""
+    t = np.asarray(t, dtype=float)
+    if t.size and not np.max(t) <= longest * (1 + 1e-12):  # beyond rounding of a sum of steps
+        late = f"creep is requested at {np.max(t):g} s, and the table ends at {longest:g} s"
+        raise InputError(f"{late}: expected a table as long as the program; creep data are not extrapolated")
+    return np.minimum(t, longest)
+
+
+# (-1)^(k+1) / (k+1)! for k >= 1: up to 0.3 the next term is below rounding
+_POWERS = np.arange(1.0, 14)
+_SERIES = np.cumprod(np.append(0.5, -1.0 / np.arange(3, 15)))
+
+
+def one_less_mean_decay(x: ArrayLike) -> Array:
+    """Return ``1 - (1 - exp(-x)) / x`` to full relative precision for any ``x >= 0``; ``x / 2`` for small ``x``."""
+    x = np.asarray(x, dtype=float)
+    small, large = np.minimum(x, 0.3), np.maximum(x, 0.3)
+    series = np.add.reduce(_SERIES * small[..., None] ** _POWERS, axis=-1)
+    return np.where(x < 0.3, series, 1 + np.expm1(-large) / large)
 
 
 @dataclass(frozen=True, repr=False)
@@ -412,255 +504,3 @@ def check_material(material: Any, key: str = "material") -> Material:
     if not isinstance(material, Prony | Creep):
         raise InputError(key=key, found=material, expected="a material, such as rv.zener(...) or rv.creep(function)")
     return material
-
-
-def check_creep(material: Material, times: Array) -> Array:
-    """Return the creep compliance at some times [1/Pa], after a check that it is not negative and does not decrease.
-
-    Parameters
-    ----------
-    material : Prony or Creep
-        Material to check.
-    times : ndarray
-        Times, positive and ascending. [s]
-
-    Raises
-    ------
-    InputError
-        If the number of values is wrong, or a value is negative, not finite, lower than an earlier one, or zero after
-        time zero. The message names the time.
-    """
-    times = np.append(0.0, times)
-    values = material.creep_compliance(times)
-    if values.shape != times.shape:
-        raise InputError(f"creep of {material!r} gives {values.shape} of {times.shape} times: expected a number each")
-    falls = np.append(False, np.diff(values) < -_ROUNDING * values[1:])
-    is_possible = np.isfinite(values) & (values >= 0) & ((values > 0) | (times == 0)) & ~falls
-    for at in np.flatnonzero(~is_possible)[:1]:
-        found = f"creep of {material!r} is {values[at]:g} 1/Pa at {times[at]:g} s"
-        raise InputError(f"{found}: expected a positive compliance (zero only at time zero), no less than before")
-    return values[1:]
-
-
-def series(material: Material, shortest: float, longest: float, tolerance: float) -> tuple[Prony, float]:
-    r"""Fit a Prony series to a material for a range of times.
-
-    Parameters
-    ----------
-    material : Material
-        Any material. A Prony series is returned unchanged, unless it was fitted to a creep table with more terms than
-        the tolerance needs.
-    shortest, longest : float
-        Range of times. [s]
-    tolerance : float
-        Largest relative error allowed.
-
-    Returns
-    -------
-    series : Prony
-        The series with the fewest terms within the tolerance; otherwise the most accurate series. It has the
-        instantaneous compliance of the material.
-    error : float
-        Largest ``|J~ - J| / J`` at a hundred instants per decade, more than the series was fitted to. It exceeds the
-        tolerance if the material is not passive.
-
-    Raises
-    ------
-    InputError
-        If the material is not known over the range, or its creep compliance decreases.
-
-    Notes
-    -----
-    Non-negative least squares [1]_ on a lattice of retardation times, :math:`J_0 + \varphi t + \sum_i J_i (1 -
-    e^{-t/\tau_i})`. The rows are reweighted by the error to reduce its largest value (Lawson's iteration [1]_).
-
-    References
-    ----------
-    .. [1] C. L. Lawson and R. J. Hanson, *Solving Least Squares Problems*, Prentice-Hall, 1974, chapter 23.
-    """
-    if isinstance(material, Prony) and material.longest == math.inf:
-        return material, 0.0
-    instants = _instants(shortest, longest, _MEASURED)
-    compliance = check_creep(material, instants)
-    if isinstance(material, Creep) and material.function is pair_creep:
-        joined = cast(Prony, pair(*(series(one, shortest, longest, tolerance)[0] for one in material.parameters)))
-        return joined, _error(joined, instants, compliance)
-    fits = _fits(material, instants, compliance, tolerance)
-    error, found = min(fits, key=lambda one: (max(one[0], tolerance), len(one[1].times)))
-    if isinstance(material, Prony) and (error > tolerance or len(found.times) >= len(material.times)):
-        return replace(material, longest=math.inf), 0.0
-    return found, error
-
-
-def _fits(material: Material, instants: Array, compliance: Array, tolerance: float) -> Iterator[tuple[float, Prony]]:
-    """Yield errors and series, from ever denser lattices of retardation times."""
-    shortest, longest = instants[0], instants[-1]
-    glassy, t = float(material.creep_compliance(0.0)), _instants(shortest, longest, _FITTED)
-    exact = material.creep_compliance(t)
-    for faster in _FASTER:
-        idle, reached = 0, math.inf
-        for per_decade in _OFFERED:
-            times = lattice(shortest / faster, longest * _SLOWER, per_decade)
-            if idle == _IDLE or reached <= tolerance or times.size > _MOST_OFFERED:
-                break
-            columns = np.column_stack([t / longest, -np.expm1(-t[:, None] / times)])
-            before, importance = reached, np.ones(t.size)
-            for _ in range(_LEVELLINGS):
-                weights = nonnegative(columns, exact - glassy, exact / importance)
-                used = weights[1:] > 0
-                terms = tuple(weights[1:][used]), tuple(times[used])
-                found = Prony(glassy, float(weights[0] / longest), *terms, material.poisson)
-                error = _error(found, instants, compliance)
-                yield error, found
-                reached = min(reached, error)
-                misfit = np.abs((glassy + columns @ weights) / exact - 1)
-                importance = importance * np.sqrt(0.02 + misfit / max(float(misfit.max()), 1e-300))
-            idle = 0 if reached < 0.9 * before else idle + 1
-
-
-def _instants(shortest: float, longest: float, per_decade: int) -> Array:
-    """Return at least `per_decade` instants, evenly spaced in the logarithm. [s]"""
-    return np.geomspace(shortest, longest, int(per_decade * max(np.log10(longest / shortest), 1.0)) + 1)
-
-
-def _error(found: Prony, instants: Array, compliance: Array) -> float:
-    """Return the largest relative error of the creep compliance at some instants."""
-    return float(np.abs(found.creep_compliance(instants) / compliance - 1).max())
-
-
-def lattice(shortest: float, longest: float, per_decade: float) -> Array:
-    """Return times from the shortest to the longest, evenly spaced in the logarithm. [s]"""
-    count = max(2, int(np.ceil(per_decade * np.log10(longest / shortest))) + 1) if longest > shortest else 1
-    return np.geomspace(shortest, longest, count)
-
-
-def nonnegative(columns: Array, target: Array, scale: Array) -> Array:
-    """Return non-negative weights of columns, mostly zeros, whose weighted sum fits a target in least squares.
-
-    Parameters
-    ----------
-    columns : ndarray, shape (rows, terms)
-        Columns to combine.
-    target : ndarray, shape (rows,)
-        Target of the sum.
-    scale : ndarray, shape (rows,)
-        Positive scale of the misfit of each row.
-    """
-    if not columns.size:  # which SciPy's function cannot do
-        return np.zeros(columns.shape[1])
-    scaled = columns / scale[:, None]
-    norms = np.sqrt(np.sum(scaled**2, axis=0))
-    norms[norms == 0] = 1.0
-    matrix, wanted = scaled / norms, target / scale
-    if wanted.size > _MANY:  # the triangular factor has the same squared misfit up to a constant
-        factor: Array = np.asarray(np.linalg.qr(np.column_stack([matrix, wanted]), mode="r"))
-        matrix, wanted = factor[:, :-1], factor[:, -1]
-    weights, _ = scipy.optimize.nnls(matrix, wanted, maxiter=50 * columns.shape[1])
-    seen = np.abs(scaled / norms).max(axis=0) * weights
-    return np.where(seen > _UNSEEN, weights / norms, 0.0)
-
-
-def complex_compliance(material: Material, frequency: ArrayLike) -> NDArray[np.complex128]:
-    r"""Return the complex contact compliance: displacement over pressure if both oscillate as ``exp(i w t)``.
-
-    Parameters
-    ----------
-    material : Material
-        Series, power laws and pairs of these have closed forms. Any other material is replaced by a series, see
-        :func:`over_frequencies`.
-    frequency : array_like
-        Angular frequencies ``w``, of either sign. [1/s]
-
-    Returns
-    -------
-    ndarray of complex
-        ``C*(w)``, conjugate for frequencies of opposite sign, with a negative or zero imaginary part at positive
-        frequencies. At zero frequency the compliance after endless creep: real, or infinite if the material flows.
-        [1/Pa]
-
-    Raises
-    ------
-    InputError
-        If a table ends before the times that the frequencies need.
-
-    Notes
-    -----
-    With :math:`C(t) = \tfrac{1 - \nu}{2} J(t)`,
-
-    .. math:: C^*(\omega) = \frac{1-\nu}{2} \left[ J_0 + \sum_i \frac{J_i}{1 + i \omega \tau_i}
-              + \frac{\varphi}{i \omega} \right], \qquad
-              J^*(\omega) = J_0 + c\, \Gamma(1 + \alpha)\, (i \omega T)^{-\alpha}.
-
-    References
-    ----------
-    .. [1] J. D. Ferry, *Viscoelastic Properties of Polymers*, 3rd ed., Wiley, 1980, chapter 3.
-
-    Examples
-    --------
-    >>> from roughvisc.mechanics.materials.prony import zener
-    >>> found = complex_compliance(zener(1.0, 1.0, 1.0), [0.0, 1.0])  # C = 1/4 (1 + 1 / (1 + i w))
-    >>> found.real.tolist(), found.imag.tolist()
-    ([0.5, 0.375], [0.0, -0.125])
-    """
-    w = np.asarray(frequency, dtype=float)
-    material = over_frequencies(material, w)
-    if isinstance(material, Creep) and material.function is pair_creep:
-        return np.asarray(sum(complex_compliance(one, w) for one in material.parameters))
-    with np.errstate(divide="ignore", invalid="ignore"):  # at zero frequency
-        found = 0.5 * (1 - material.poisson) * laplace_compliance(material, 1j * w)
-    return np.where(np.isfinite(found), found, complex(math.inf, 0.0))
-
-
-def laplace_compliance(material: Material, s: NDArray[Any]) -> NDArray[Any]:
-    """Return the shear compliance of a series or a power law under a pressure that grows as ``exp(s t)``.
-
-    Parameters
-    ----------
-    material : Material
-        Series, or power law.
-    s : ndarray
-        Real or complex rates. [1/s]
-
-    Returns
-    -------
-    ndarray
-        Shear compliance: ``s`` times the Laplace transform of ``J(t)``. [1/Pa]
-    """
-    if isinstance(material, Creep):
-        glassy, coefficient, exponent, time_scale = material.parameters
-        crept = coefficient * math.gamma(1 + exponent) * (s * (material.time_factor * time_scale)) ** -exponent
-        return np.asarray((glassy + crept) / material.modulus_factor)
-    found = material.glassy + (material.fluidity / s if material.fluidity else 0 * s)
-    for compliance, time in zip(material.compliances, material.times, strict=True):
-        found = found + compliance / (1 + s * time)
-    return np.asarray(found)
-
-
-def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float = 1e-4) -> Material:
-    """Return a material with a closed form of the complex compliance that replaces a material at some frequencies.
-
-    Parameters
-    ----------
-    material : Material
-        Series, power laws and pairs of these are returned unchanged. Measured creep is replaced by the series fitted
-        to it, any other material by a certified series.
-    frequency : array_like
-        Angular frequencies, of either sign. [1/s]
-    tolerance : float
-        Relative error of a series that replaces the material.
-
-    Raises
-    ------
-    InputError
-        See :func:`complex_compliance`.
-    """
-    if isinstance(material, Creep) and material.function is pair_creep:
-        return pair(*(over_frequencies(one, frequency, tolerance) for one in material.parameters))
-    if material.longest == math.inf if isinstance(material, Prony) else material.function is power_creep:
-        return material
-    size = np.abs(np.asarray(frequency, dtype=float))
-    shortest, longest = 1 / (_BEYOND * float(size.max())), _BEYOND / float(size[size > 0].min())
-    if isinstance(material, Creep):
-        return series(material, shortest, longest, tolerance)[0]
-    material.creep_compliance(longest)  # refuses a table that ends earlier
-    return replace(material, longest=math.inf)

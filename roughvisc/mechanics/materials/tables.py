@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.creep import lattice, nonnegative
-from roughvisc.mechanics.materials.prony import Kind, Prony, relaxation_series, tensile_to_shear
+from roughvisc.mechanics.materials.creep import Prony
+from roughvisc.mechanics.materials.prony import Kind, relaxation_series, tensile_to_shear
+from roughvisc.mechanics.materials.series import lattice, nonnegative
 from roughvisc.units import Quantity, format_quantity, quantities
 
 Array = NDArray[np.float64]

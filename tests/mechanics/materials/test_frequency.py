@@ -6,7 +6,7 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.creep import complex_compliance
+from roughvisc.mechanics.materials.series import complex_compliance
 
 FREQUENCIES = np.array([-30.0, -1.0, 0.01, 0.7, 100.0])
 

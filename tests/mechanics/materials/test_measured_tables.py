@@ -12,7 +12,7 @@ from support import refused
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.creep import series
+from roughvisc.mechanics.materials.series import series
 
 # --- creep ----------------------------------------------------------------------------------------------------------
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
-from roughvisc.mechanics.materials.creep import series
+from roughvisc.mechanics.materials.series import series
 
 
 def true_error(material, found, shortest, longest):

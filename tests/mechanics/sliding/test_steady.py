@@ -10,7 +10,7 @@ import roughvisc as rv
 from roughvisc.mechanics.body import HALF_SPACE
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
-from roughvisc.mechanics.materials.creep import complex_compliance
+from roughvisc.mechanics.materials.series import complex_compliance
 from roughvisc.mechanics.sheet import Sheet
 
 LOSSY = {0.2: 0.48, 0.9: 4.4, 2.2: 20.0}  # the largest loss tangent: retarded over instantaneous compliance

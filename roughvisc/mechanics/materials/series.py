@@ -1,0 +1,299 @@
+"""Certified exponential series of any material, and the complex compliance under oscillating pressure.
+
+The solver uses the Prony series that :func:`series` fits to any material for the times of the program, with a measured
+error. The terms of a series are positive, so that it is a passive material. It has the instantaneous compliance of the
+material, so that jumps are exact. Both compliances increase. Before the shortest time they therefore differ by less
+than the creep up to this time.
+
+Under oscillating pressure a material has a complex compliance. Series and power laws have it in closed form. Any other
+material is replaced by a certified series.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+import scipy  # which imports a submodule when it is first used: scipy.optimize takes 0.2 s
+from numpy.typing import ArrayLike, NDArray
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.materials.creep import Creep, Material, Prony, pair, pair_creep, power_creep
+
+Array = NDArray[np.float64]
+
+#: Largest relative decrease of a creep function that counts as rounding.
+_ROUNDING = 1e-9
+#: Number of times per decade at which a series is fitted, and at which its error is measured.
+_FITTED, _MEASURED = 30, 100
+#: Numbers of retardation times per decade to try in turn, and largest number of retardation times.
+_OFFERED, _MOST_OFFERED = (0.5, 0.7, 1, 1.5, 2, 3, 4, 6, 8, 12, 24, 48), 300
+#: Shortest time over the shortest retardation time, two values to try: the larger one gives a better fit before the
+#: shortest time, with more terms. Longest retardation time over the longest time.
+_FASTER, _SLOWER = (3.0, 10.0), 3.0
+#: Number of times that the rows are reweighted to level the error.
+_LEVELLINGS = 6
+#: Number of successive trials without a smaller error after which the fit ends.
+_IDLE = 3
+#: Terms whose part of the target is below this in all rows are left out.
+_UNSEEN = 1e-10
+#: Factor by which the times of a series must extend beyond the times of the frequencies, shorter and longer: a term
+#: whose time is a hundred times off contributes a hundredth of its loss.
+_BEYOND = 100.0
+#: Number of rows above which they are first reduced to a triangular factor.
+_MANY = 1000
+
+
+def check_creep(material: Material, times: Array) -> Array:
+    """Return the creep compliance at some times [1/Pa], after a check that it is not negative and does not decrease.
+
+    Parameters
+    ----------
+    material : Prony or Creep
+        Material to check.
+    times : ndarray
+        Times, positive and ascending. [s]
+
+    Raises
+    ------
+    InputError
+        If the number of values is wrong, or a value is negative, not finite, lower than an earlier one, or zero after
+        time zero. The message names the time.
+    """
+    times = np.append(0.0, times)
+    values = material.creep_compliance(times)
+    if values.shape != times.shape:
+        raise InputError(f"creep of {material!r} gives {values.shape} of {times.shape} times: expected a number each")
+    falls = np.append(False, np.diff(values) < -_ROUNDING * values[1:])
+    is_possible = np.isfinite(values) & (values >= 0) & ((values > 0) | (times == 0)) & ~falls
+    for at in np.flatnonzero(~is_possible)[:1]:
+        found = f"creep of {material!r} is {values[at]:g} 1/Pa at {times[at]:g} s"
+        raise InputError(f"{found}: expected a positive compliance (zero only at time zero), no less than before")
+    return values[1:]
+
+
+def series(material: Material, shortest: float, longest: float, tolerance: float) -> tuple[Prony, float]:
+    r"""Fit a Prony series to a material for a range of times.
+
+    Parameters
+    ----------
+    material : Material
+        Any material. A Prony series is returned unchanged, unless it was fitted to a creep table with more terms than
+        the tolerance needs.
+    shortest, longest : float
+        Range of times. [s]
+    tolerance : float
+        Largest relative error allowed.
+
+    Returns
+    -------
+    series : Prony
+        The series with the fewest terms within the tolerance; otherwise the most accurate series. It has the
+        instantaneous compliance of the material.
+    error : float
+        Largest ``|J~ - J| / J`` at a hundred instants per decade, more than the series was fitted to. It exceeds the
+        tolerance if the material is not passive.
+
+    Raises
+    ------
+    InputError
+        If the material is not known over the range, or its creep compliance decreases.
+
+    Notes
+    -----
+    Non-negative least squares [1]_ on a lattice of retardation times, :math:`J_0 + \varphi t + \sum_i J_i (1 -
+    e^{-t/\tau_i})`. The rows are reweighted by the error to reduce its largest value (Lawson's iteration [1]_).
+
+    References
+    ----------
+    .. [1] C. L. Lawson and R. J. Hanson, *Solving Least Squares Problems*, Prentice-Hall, 1974, chapter 23.
+    """
+    if isinstance(material, Prony) and material.longest == math.inf:
+        return material, 0.0
+    instants = _instants(shortest, longest, _MEASURED)
+    compliance = check_creep(material, instants)
+    if isinstance(material, Creep) and material.function is pair_creep:
+        joined = cast(Prony, pair(*(series(one, shortest, longest, tolerance)[0] for one in material.parameters)))
+        return joined, _error(joined, instants, compliance)
+    fits = _fits(material, instants, compliance, tolerance)
+    error, found = min(fits, key=lambda one: (max(one[0], tolerance), len(one[1].times)))
+    if isinstance(material, Prony) and (error > tolerance or len(found.times) >= len(material.times)):
+        return replace(material, longest=math.inf), 0.0
+    return found, error
+
+
+def _fits(material: Material, instants: Array, compliance: Array, tolerance: float) -> Iterator[tuple[float, Prony]]:
+    """Yield errors and series, from ever denser lattices of retardation times."""
+    shortest, longest = instants[0], instants[-1]
+    glassy, t = float(material.creep_compliance(0.0)), _instants(shortest, longest, _FITTED)
+    exact = material.creep_compliance(t)
+    for faster in _FASTER:
+        idle, reached = 0, math.inf
+        for per_decade in _OFFERED:
+            times = lattice(shortest / faster, longest * _SLOWER, per_decade)
+            if idle == _IDLE or reached <= tolerance or times.size > _MOST_OFFERED:
+                break
+            columns = np.column_stack([t / longest, -np.expm1(-t[:, None] / times)])
+            before, importance = reached, np.ones(t.size)
+            for _ in range(_LEVELLINGS):
+                weights = nonnegative(columns, exact - glassy, exact / importance)
+                used = weights[1:] > 0
+                terms = tuple(weights[1:][used]), tuple(times[used])
+                found = Prony(glassy, float(weights[0] / longest), *terms, material.poisson)
+                error = _error(found, instants, compliance)
+                yield error, found
+                reached = min(reached, error)
+                misfit = np.abs((glassy + columns @ weights) / exact - 1)
+                importance = importance * np.sqrt(0.02 + misfit / max(float(misfit.max()), 1e-300))
+            idle = 0 if reached < 0.9 * before else idle + 1
+
+
+def _instants(shortest: float, longest: float, per_decade: int) -> Array:
+    """Return at least `per_decade` instants, evenly spaced in the logarithm. [s]"""
+    return np.geomspace(shortest, longest, int(per_decade * max(np.log10(longest / shortest), 1.0)) + 1)
+
+
+def _error(found: Prony, instants: Array, compliance: Array) -> float:
+    """Return the largest relative error of the creep compliance at some instants."""
+    return float(np.abs(found.creep_compliance(instants) / compliance - 1).max())
+
+
+def lattice(shortest: float, longest: float, per_decade: float) -> Array:
+    """Return times from the shortest to the longest, evenly spaced in the logarithm. [s]"""
+    count = max(2, int(np.ceil(per_decade * np.log10(longest / shortest))) + 1) if longest > shortest else 1
+    return np.geomspace(shortest, longest, count)
+
+
+def nonnegative(columns: Array, target: Array, scale: Array) -> Array:
+    """Return non-negative weights of columns, mostly zeros, whose weighted sum fits a target in least squares.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (rows, terms)
+        Columns to combine.
+    target : ndarray, shape (rows,)
+        Target of the sum.
+    scale : ndarray, shape (rows,)
+        Positive scale of the misfit of each row.
+    """
+    if not columns.size:  # which SciPy's function cannot do
+        return np.zeros(columns.shape[1])
+    scaled = columns / scale[:, None]
+    norms = np.sqrt(np.sum(scaled**2, axis=0))
+    norms[norms == 0] = 1.0
+    matrix, wanted = scaled / norms, target / scale
+    if wanted.size > _MANY:  # the triangular factor has the same squared misfit up to a constant
+        factor: Array = np.asarray(np.linalg.qr(np.column_stack([matrix, wanted]), mode="r"))
+        matrix, wanted = factor[:, :-1], factor[:, -1]
+    weights, _ = scipy.optimize.nnls(matrix, wanted, maxiter=50 * columns.shape[1])
+    seen = np.abs(scaled / norms).max(axis=0) * weights
+    return np.where(seen > _UNSEEN, weights / norms, 0.0)
+
+
+def complex_compliance(material: Material, frequency: ArrayLike) -> NDArray[np.complex128]:
+    r"""Return the complex contact compliance: displacement over pressure if both oscillate as ``exp(i w t)``.
+
+    Parameters
+    ----------
+    material : Material
+        Series, power laws and pairs of these have closed forms. Any other material is replaced by a series, see
+        :func:`over_frequencies`.
+    frequency : array_like
+        Angular frequencies ``w``, of either sign. [1/s]
+
+    Returns
+    -------
+    ndarray of complex
+        ``C*(w)``, conjugate for frequencies of opposite sign, with a negative or zero imaginary part at positive
+        frequencies. At zero frequency the compliance after endless creep: real, or infinite if the material flows.
+        [1/Pa]
+
+    Raises
+    ------
+    InputError
+        If a table ends before the times that the frequencies need.
+
+    Notes
+    -----
+    With :math:`C(t) = \tfrac{1 - \nu}{2} J(t)`,
+
+    .. math:: C^*(\omega) = \frac{1-\nu}{2} \left[ J_0 + \sum_i \frac{J_i}{1 + i \omega \tau_i}
+              + \frac{\varphi}{i \omega} \right], \qquad
+              J^*(\omega) = J_0 + c\, \Gamma(1 + \alpha)\, (i \omega T)^{-\alpha}.
+
+    References
+    ----------
+    .. [1] J. D. Ferry, *Viscoelastic Properties of Polymers*, 3rd ed., Wiley, 1980, chapter 3.
+
+    Examples
+    --------
+    >>> from roughvisc.mechanics.materials.prony import zener
+    >>> found = complex_compliance(zener(1.0, 1.0, 1.0), [0.0, 1.0])  # C = 1/4 (1 + 1 / (1 + i w))
+    >>> found.real.tolist(), found.imag.tolist()
+    ([0.5, 0.375], [0.0, -0.125])
+    """
+    w = np.asarray(frequency, dtype=float)
+    material = over_frequencies(material, w)
+    if isinstance(material, Creep) and material.function is pair_creep:
+        return np.asarray(sum(complex_compliance(one, w) for one in material.parameters))
+    with np.errstate(divide="ignore", invalid="ignore"):  # at zero frequency
+        found = 0.5 * (1 - material.poisson) * laplace_compliance(material, 1j * w)
+    return np.where(np.isfinite(found), found, complex(math.inf, 0.0))
+
+
+def laplace_compliance(material: Material, s: NDArray[Any]) -> NDArray[Any]:
+    """Return the shear compliance of a series or a power law under a pressure that grows as ``exp(s t)``.
+
+    Parameters
+    ----------
+    material : Material
+        Series, or power law.
+    s : ndarray
+        Real or complex rates. [1/s]
+
+    Returns
+    -------
+    ndarray
+        Shear compliance: ``s`` times the Laplace transform of ``J(t)``. [1/Pa]
+    """
+    if isinstance(material, Creep):
+        glassy, coefficient, exponent, time_scale = material.parameters
+        crept = coefficient * math.gamma(1 + exponent) * (s * (material.time_factor * time_scale)) ** -exponent
+        return np.asarray((glassy + crept) / material.modulus_factor)
+    found = material.glassy + (material.fluidity / s if material.fluidity else 0 * s)
+    for compliance, time in zip(material.compliances, material.times, strict=True):
+        found = found + compliance / (1 + s * time)
+    return np.asarray(found)
+
+
+def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float = 1e-4) -> Material:
+    """Return a material with a closed form of the complex compliance that replaces a material at some frequencies.
+
+    Parameters
+    ----------
+    material : Material
+        Series, power laws and pairs of these are returned unchanged. Measured creep is replaced by the series fitted
+        to it, any other material by a certified series.
+    frequency : array_like
+        Angular frequencies, of either sign. [1/s]
+    tolerance : float
+        Relative error of a series that replaces the material.
+
+    Raises
+    ------
+    InputError
+        See :func:`complex_compliance`.
+    """
+    if isinstance(material, Creep) and material.function is pair_creep:
+        return pair(*(over_frequencies(one, frequency, tolerance) for one in material.parameters))
+    if material.longest == math.inf if isinstance(material, Prony) else material.function is power_creep:
+        return material
+    size = np.abs(np.asarray(frequency, dtype=float))
+    shortest, longest = 1 / (_BEYOND * float(size.max())), _BEYOND / float(size[size > 0].min())
+    if isinstance(material, Creep):
+        return series(material, shortest, longest, tolerance)[0]
+    material.creep_compliance(longest)  # refuses a table that ends earlier
+    return replace(material, longest=math.inf)
