@@ -206,29 +206,29 @@ def choose_surface(
         while enlarged is None and estimate.at_border and (larger := enlarged_indenter(profile.height)) is not None:
             profile, times = Profile(larger, settings.missing, body.kernel), times + 1
             estimate = estimated(profile, compliance, program)
-    return profile, choose_domain(profile, body.kernel, estimate, GROWTH**outgrown), times, estimate.at_border
+    shape = profile.gap.shape[0], profile.gap.shape[1]
+    domain = Domain((slice(None), slice(None)), shape, profile.spacing, math.inf, profile.kernel)
+    can_crop = not body.kernel.raises_surface and profile.all_present and min(shape) >= WORTH_CROPPING
+    if can_crop and math.isfinite(estimate.approach):
+        domain = cropped(domain, profile, estimate, GROWTH**outgrown)
+    return profile, domain, times, estimate.at_border
 
 
-def choose_domain(profile: Profile, kernel: Kernel, estimate: Estimate, growth: float) -> Domain:
-    """Return the part of a surface that may touch during a run.
+def cropped(whole: Domain, profile: Profile, estimate: Estimate, growth: float) -> Domain:
+    """Return the part of a surface that may touch during a run, or the whole surface if this part is large.
 
     Parameters
     ----------
+    whole : Domain
+        The whole surface.
     profile : Profile
         The surface.
-    kernel : Kernel
-        Kernel of the body.
     estimate : Estimate
-        Estimated contact. The domain is the whole surface if its approach is not known.
+        Estimated contact.
     growth : float
         Factor of the approach, or of the size of the contact of an indenter.
     """
-    gap, shape = profile.gap, (profile.gap.shape[0], profile.gap.shape[1])
-    whole = Domain((slice(None), slice(None)), shape, profile.spacing, math.inf, profile.kernel)
-    may_crop = not kernel.raises_surface and profile.all_present and min(shape) >= WORTH_CROPPING
-    if not may_crop or math.isinf(estimate.approach):
-        return whole
-    outside, wider, corners = math.inf, 0, estimate.cells
+    gap, shape, outside, wider, corners = profile.gap, whole.shape, math.inf, 0, estimate.cells
     is_connected = corners is not None and indenter_of(profile.height) is not None
     if corners is None or not is_connected:
         corners = np.argwhere(gap <= MARGIN * growth * estimate.approach)
