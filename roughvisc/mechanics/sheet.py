@@ -26,18 +26,13 @@ Base = Literal["bonded", "slipping"]
 BASE: Base = "bonded"
 # Distance in thicknesses beyond which the kernel is set to zero: it is below 1e-17 of its value at one thickness.
 _REACH = 46.0
-# Argument x from which 1 - S(x), which decreases as x^2 exp(-2 x), is below rounding.
-_SHORTEST_WAVE = 24.0
 # Nodes of the correction per thickness, and degree of the spline through them: error below 1e-14.
 _PER_THICKNESS, _DEGREE = 16, 9
-# Cell side in thicknesses, and number of Gauss points per side that give the mean of the correction to 1e-13.
+# Cell side in thicknesses, and number of Gauss points per side that give the mean of the correction to 1e-13. Cells
+# with a longer side are long.
 _GAUSS = ((0.01, 2), (0.05, 3), (0.15, 4), (0.5, 7))
-# Cell side in thicknesses above which cells are long.
-_LONG = 0.5
 # Below this x, sinh(2 x) - 2 x is computed from its series, with these coefficients.
 _SERIES_BELOW, _SERIES = 0.5, 1 / np.cumprod(np.arange(2.0, 27))[1::2]
-# Smallest x, below which the transfer function has the value of uniform pressure.
-_LONGEST_WAVE = 1e-150
 
 
 @quantities(thickness="m")
@@ -137,22 +132,20 @@ class Sheet(Kernel):
 
     def transfer(self, qx: ArrayLike, qy: ArrayLike) -> Array:
         """Return ``(2 / |q|) S(|q| h)``; at ``q = 0`` the limit, zero if the sheet is incompressible. [m]"""
-        x = np.maximum(np.hypot(qx, qy) * self.thickness, _LONGEST_WAVE)
-        return 2 * self.thickness / x * reduction(x, self.poisson, self.base)
+        x = np.maximum(np.hypot(qx, qy) * self.thickness, 1e-150)  # which has the value of uniform pressure
+        return 2 * self.thickness / x * factors(x, self.poisson, self.base)[0]
 
     def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
         """Return Love's kernel less the correction, to 1e-13 of the largest value; or the kernel of long cells. [m]"""
         dx, dy = (side / self.thickness for side in spacing)
-        if max(dx, dy) > _LONG:
+        if max(dx, dy) > _GAUSS[-1][0]:
             return self._influence_of_long_cells(shape, spacing)
         kernel = love_kernel(shape, spacing)
-        x, y = dx * np.arange(shape[0]), dy * np.arange(shape[1])
-        near = np.hypot(x[:, None], y) <= _REACH - math.hypot(dx, dy) / 2
+        x, y = np.broadcast_arrays(dx * np.arange(shape[0])[:, None], dy * np.arange(shape[1]))
+        near = np.hypot(x, y) <= _REACH - math.hypot(dx, dy) / 2
         kernel[~near] = 0
-        rows, columns = np.nonzero(near)
-        correction = _correction(self.poisson if self.base == "bonded" else 0.5, self.base)
-        points = [next(count for longest, count in _GAUSS if side <= longest) for side in (dx, dy)]
-        mean = cell_mean(correction, x[rows], y[columns], (dx, dy), (points[0], points[1]))
+        along_x, along_y = (next(count for longest, count in _GAUSS if side <= longest) for side in (dx, dy))
+        mean = cell_mean(_correction(self.poisson, self.base), x[near], y[near], (dx, dy), (along_x, along_y))
         kernel[near] -= mean * (spacing[0] * spacing[1] / self.thickness)
         return kernel
 
@@ -163,15 +156,15 @@ class Sheet(Kernel):
         transform is then smooth at the shortest wave, so that the kernel decays exponentially. Its relative error of
         long waves is below ``(q dx)^4 / 90``.
         """
-        h = self.thickness
-        counts = [max(n, math.ceil(_REACH * h / side) + 16) for n, side in zip(shape, spacing, strict=True)]
+        reach = _REACH * self.thickness
+        counts = [max(n, math.ceil(reach / side) + 16) for n, side in zip(shape, spacing, strict=True)]
         sines = [np.sin(np.pi / 2 * np.arange(count) / (count - 1)) ** 2 for count in counts]
         qx, qy = (2 / side * np.sqrt(s + s**2 / 3) for s, side in zip(sines, spacing, strict=True))
         return np.asarray(scipy.fft.idctn(self.transfer(qx[:, None], qy), type=1))[: shape[0], : shape[1]]
 
 
-def reduction(x: ArrayLike, poisson: float, base: Base) -> Array:
-    """Return the factor ``S`` of a wave: its displacement over the displacement of a half-space.
+def factors(x: ArrayLike, poisson: float, base: Base) -> tuple[Array, Array]:
+    """Return the factor ``S`` of a wave, its displacement over the displacement of a half-space, and ``1 - S``.
 
     Parameters
     ----------
@@ -184,39 +177,26 @@ def reduction(x: ArrayLike, poisson: float, base: Base) -> Array:
     Returns
     -------
     ndarray
-        Between 0 and 1; exact to rounding for every `x`.
+        Each between 0 and 1, and exact to rounding for every `x`.
     """
     x = np.asarray(x, dtype=float)
-    e = np.exp(-2 * x)
+    e, four = np.exp(-2 * x), -np.expm1(-4 * x)
     if base == "slipping":
-        return np.asarray(np.expm1(-2 * x) ** 2 / (-np.expm1(-4 * x) + 4 * x * e))
-    k, rest = _bonded(x, poisson)
-    y = 2 * np.minimum(x, _SERIES_BELOW)
-    series = y**3 * np.polynomial.polynomial.polyval(y**2, _SERIES)  # sinh(y) - y, whose terms cancel if y is small
-    excess = np.where(x < _SERIES_BELOW, 2 * e * series, -np.expm1(-4 * x) - 4 * x * e)
-    return np.asarray((excess - (k - 1) * np.expm1(-4 * x)) / (k * (1 + e * e) + 2 * e * rest))
-
-
-def complement(x: ArrayLike, poisson: float, base: Base) -> Array:
-    """Return ``1 - S`` of waves, for positive ``x``, without cancellation."""
-    x = np.asarray(x, dtype=float)
-    e = np.exp(-2 * x)
-    if base == "slipping":
-        return np.asarray(2 * e * (2 * x - np.expm1(-2 * x)) / (-np.expm1(-4 * x) + 4 * x * e))
-    k, rest = _bonded(x, poisson)
-    return np.asarray(2 * e * (k * e + rest + 2 * x) / (k * (1 + e * e) + 2 * e * rest))
-
-
-def _bonded(x: Array, poisson: float) -> tuple[float, Array]:
-    """Return ``k``, and the rest of the denominator next to ``k cosh 2x``."""
-    return 3 - 4 * poisson, 2 * x**2 + 5 - 12 * poisson + 8 * poisson**2
+        two, denominator = -np.expm1(-2 * x), four + 4 * x * e
+        return two**2 / denominator, 2 * e * (2 * x + two) / denominator
+    k, rest = 3 - 4 * poisson, 2 * x**2 + 5 - 12 * poisson + 8 * poisson**2
+    denominator = k * (1 + e * e) + 2 * e * rest
+    excess, small = np.asarray(four - 4 * x * e), x < _SERIES_BELOW
+    y = 2 * x[small]  # sinh(y) - y, whose terms cancel if y is small, is a series
+    excess[small] = 2 * e[small] * (y**3 * np.polynomial.polynomial.polyval(y**2, _SERIES))
+    return (excess + (k - 1) * four) / denominator, 2 * e * (k * e + rest + 2 * x) / denominator
 
 
 @lru_cache(maxsize=8)
 def _correction(poisson: float, base: Base) -> Any:
     """Return a function of the distance in thicknesses: half-space kernel less sheet kernel. [1/thickness]"""
-    s, weights = panels(96, _SHORTEST_WAVE, 16)
-    amplitude = weights * complement(s, poisson, base) / math.pi
+    s, weights = panels(96, 24.0, 16)  # there 1 - S, which decreases as s^2 exp(-2 s), is below rounding
+    amplitude = weights * factors(s, poisson, base)[1] / math.pi
     # the function is even: nodes before zero keep the end of the spline away from zero
     at = np.linspace(-1.0, _REACH, math.ceil((1.0 + _REACH) * _PER_THICKNESS))
     values = np.array([amplitude @ scipy.special.j0(r * s) for r in at])

@@ -20,7 +20,7 @@ from scipy import fft, ndimage
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
-from roughvisc.mechanics.sheet import BASE, Base, Sheet, complement
+from roughvisc.mechanics.sheet import BASE, Base, Sheet, factors
 from roughvisc.observables.frames import expect_result, history
 from roughvisc.topography.borders import border_mismatch
 from roughvisc.topography.framing import mirror
@@ -384,7 +384,7 @@ def _periodic_relief(scene: Scene, sheet: Sheet) -> float:
     q = 2 * np.pi * np.hypot(along_x[:, None], along_y)
     q[0, 0] = 1.0  # of the mean, which is subtracted
     power = np.abs(fft.fft2(pressure - pressure.mean())) ** 2
-    lost = power * 2 / q * complement(q * sheet.thickness, sheet.poisson, sheet.base)
+    lost = power * 2 / q * factors(q * sheet.thickness, sheet.poisson, sheet.base)[1]
     return float(lost.sum() / (pressure.size * pressure.sum()))
 
 

@@ -8,17 +8,18 @@ from references.layered import elastic_factor
 from support import refused
 
 from roughvisc.mechanics.body import free_space_symbol, has_finite_mean, periodic_symbol
-from roughvisc.mechanics.sheet import Sheet, complement, reduction
+from roughvisc.mechanics.sheet import Sheet, factors
 
 BODIES = [("bonded", 0.0), ("bonded", 0.3), ("bonded", 0.45), ("bonded", 0.5), ("slipping", 0.3), ("slipping", 0.5)]
 
 
 @pytest.mark.parametrize(("base", "poisson"), [*BODIES, ("bonded", 0.4999999)])
 @pytest.mark.parametrize("x", [1e-5, 1e-3, 0.0999, 0.499, 0.501, 1.0, 4.0, 15.0])
-def test_reduction__is_that_of_plane_strain(base, poisson, x):
+def test_factors__are_those_of_plane_strain(base, poisson, x):
     exact = elastic_factor([x], [poisson], [1], base)
-    assert float(reduction(x, poisson, base)) == pytest.approx(float(exact), rel=2e-13)
-    assert float(complement(x, poisson, base)) == pytest.approx(float(1 - exact), rel=2e-13)
+    found, complement = factors(x, poisson, base)
+    assert float(found) == pytest.approx(float(exact), rel=2e-13)
+    assert float(complement) == pytest.approx(float(1 - exact), rel=2e-13)
 
 
 @pytest.mark.parametrize(("base", "poisson"), BODIES)

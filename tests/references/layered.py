@@ -12,7 +12,7 @@ from references.dense import settled
 from references.half_space import pressure_of_springs
 from roughvisc.mechanics.layer import effective_compliance
 from roughvisc.mechanics.materials.series import laplace_compliance
-from roughvisc.mechanics.sheet import reduction
+from roughvisc.mechanics.sheet import factors
 
 # ----------------------------------------------------------------------------------------------------------- waves
 
@@ -130,7 +130,7 @@ def factor(body, x):
     if isinstance(body, ElasticLayer):
         compliances = 2 / (1 - body.poisson), 2 / (1 - body.poisson) * body.modulus_ratio
         return effective_compliance(x, (1.0,), (body.poisson, body.base_poisson), compliances)
-    return reduction(x, body.poisson, body.base)
+    return factors(x, body.poisson, body.base)[0]
 
 
 @dataclass(frozen=True)
