@@ -223,6 +223,7 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     coordinates = {axis: kept[axis].to_numpy(), "x": height["x"].values, "y": height["y"].values}
     made = {"Conventions": "CF-1.11", "boundary": settings.boundary, "tolerance": settings.tolerance}
     made["history"] = str(height.attrs.get("history", ""))
+    made |= experiment.facts(rows.problem.body, height)
     dataset, warnings = rows.finish(xr.Dataset(variables, coordinates, made))
 
     tables, lines = list[str](), list[str]()

@@ -78,7 +78,7 @@ class Rows(ABC):
 
     @abstractmethod
     def finish(self, dataset: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
-        """Return the result with its attributes from the values and fields of its rows, and warnings by subject."""
+        """Return the result of the values and fields of its rows with further attributes, and warnings by subject."""
 
 
 class Experiment(ABC):

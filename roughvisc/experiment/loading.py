@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from roughvisc.errors import EdgeContactError, InputError
 from roughvisc.experiment.accuracy import area_error, border_warning, error_columns, memory_of, slope_warning, wakes_of
 from roughvisc.experiment.base import Experiment, Outgrown, Row, Rows
-from roughvisc.experiment.profile import BEYOND, Domain, Profile, choose_surface, enlarged_indenter
+from roughvisc.experiment.profile import BEYOND, GROWTH, Domain, Profile, choose_surface
 from roughvisc.experiment.resources import WORTH_ASKING, require_loading
 from roughvisc.mechanics.body import Body, has_finite_mean
 from roughvisc.mechanics.contact.solver import contact_area
@@ -26,6 +26,7 @@ from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import Difference, Point, Scene, State, Step, march
 from roughvisc.mechanics.tangential import tangential_force
 from roughvisc.settings import Problem, Settings, kept_times
+from roughvisc.topography.recipes import grown
 from roughvisc.units import unit_for
 from roughvisc.variables import STATUS_MEANINGS
 
@@ -223,7 +224,7 @@ class LoadingRows(Rows):
         if self.problem.settings.edge == "accept":
             self.state = state if state.border is not None else replace(state, border=time)
             return
-        if enlarged_indenter(self.profile.height) is not None:
+        if grown(self.profile.height, GROWTH) is not None:
             raise Outgrown(LoadingState(enlarged=state.enlarged + 1, outgrown=state.outgrown))
         raise EdgeContactError(
             f"at {time:.6g} s contact reaches the border of the free-space domain of {nx} x {ny} cells: expected "
@@ -310,7 +311,7 @@ class LoadingRows(Rows):
         return row, fields
 
     def finish(self, dataset: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
-        """Return the result with the memory model and numbers for an audit, and its warnings."""
+        """Return the result with the memory model and the cycles, and its warnings."""
         scene, profile, choice, limit, warnings = self.scene, self.profile, self.choice, self.scene.tolerance, {}
         boundary, program, errors = scene.grid.boundary, scene.program, dataset["stated_error"].values
         missed = errors[errors > limit]
@@ -339,8 +340,7 @@ class LoadingRows(Rows):
                 f"The series in place of the material is {100 * off:.2g} % off at worst, more than the tolerance "
                 f"{limit:g} (memory): no passive material comes nearer to it."
             )
-        attributes = Loading(program).facts(self.problem.body, profile.height)
-        attributes |= {"memory": choice.note, "series_error": choice.series_error}
+        attributes: dict[str, Any] = {"memory": choice.note, "series_error": choice.series_error}
         if cycles := program.cycles:  # for the work in each cycle
             attributes["cycles"] = json.dumps(cycles)
         return dataset.assign_attrs(attributes), warnings

@@ -39,8 +39,6 @@ WORTH_CROPPING, LARGEST_PART = 48, 0.8
 #: Factor by which the surface of an indenter grows; and, after contact has outgrown its domain, the factor of the
 #: estimated approach, or of the size of an indenter's contact, for which the next domain is chosen.
 GROWTH = 1.5
-#: Largest number of cells of an enlarged indenter.
-MOST_CELLS = 4096**2
 
 
 class Profile:
@@ -201,9 +199,9 @@ def choose_surface(
     if settings.boundary == "free" and settings.edge == "error" and can_adapt:
         compliance = float(body.material.contact_compliance(program.duration))
         for _ in range(times):
-            profile = Profile(enlarged_indenter(profile.height), settings.missing, body.kernel)
+            profile = Profile(grown(profile.height, GROWTH), settings.missing, body.kernel)
         estimate = estimated(profile, compliance, program)
-        while enlarged is None and estimate.at_border and (larger := enlarged_indenter(profile.height)) is not None:
+        while enlarged is None and estimate.at_border and (larger := grown(profile.height, GROWTH)) is not None:
             profile, times = Profile(larger, settings.missing, body.kernel), times + 1
             estimate = estimated(profile, compliance, program)
     shape = profile.gap.shape[0], profile.gap.shape[1]
@@ -246,12 +244,6 @@ def cropped(whole: Domain, profile: Profile, estimate: Estimate, growth: float) 
     if not is_connected:
         outside = float(gap[~inside].min())
     return replace(whole, cells=cells, outside=outside, is_whole=False)
-
-
-def enlarged_indenter(height: xr.DataArray) -> xr.DataArray | None:
-    """Return an indenter on a grid 1.5 times as large; None without a recipe, or if the grid has too many cells."""
-    larger = grown(height, GROWTH)
-    return None if larger is None or larger.size > MOST_CELLS else larger
 
 
 def estimated(profile: Profile, compliance: float, program: Program) -> Estimate:

@@ -254,7 +254,7 @@ class SlidingRows(Rows):
         return row, fields
 
     def finish(self, dataset: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
-        """Return the result with the direction and numbers for an audit, and its warnings."""
+        """Return the result with the direction, and its warnings."""
         height, speeds = self.problem.height, dataset["speed"].values.tolist()
         left = dict(zip(speeds, dataset["creep_left"].values.tolist(), strict=True))
         warnings = {
@@ -262,8 +262,7 @@ class SlidingRows(Rows):
             "border": border_warning(height),
             "wake": wake_warning(left, self._period),
         }
-        attributes = self._curve.facts(self.problem.body, height) | {"direction": self._curve.direction}
-        return dataset.drop_vars("creep_left").assign_attrs(attributes), warnings
+        return dataset.drop_vars("creep_left").assign_attrs(direction=self._curve.direction), warnings
 
 
 def sliding_grid_errors(

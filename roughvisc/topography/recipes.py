@@ -26,6 +26,9 @@ from roughvisc.topography.grid import checked, counts, labelled, noted, pair, sp
 from roughvisc.topography.spectrum import psd, wavevectors
 from roughvisc.units import Quantity, number, quantities
 
+#: Largest number of cells of an indenter on a larger grid.
+_MOST_GROWN = 4096**2
+
 # ------------------------------------------------------------------------------------------------------------- recipes
 
 
@@ -316,7 +319,8 @@ def grown(h: xr.DataArray, factor: float = 1.5) -> xr.DataArray | None:
     Returns
     -------
     xarray.DataArray or None
-        None if `h` is not a sphere, cone or flat punch, see :func:`indenter_of`.
+        None if `h` is not a sphere, cone or flat punch, see :func:`indenter_of`, or if the larger grid has more than
+        4096 x 4096 cells.
     """
     known = indenter_of(h)
     if known is None:
@@ -327,6 +331,8 @@ def grown(h: xr.DataArray, factor: float = 1.5) -> xr.DataArray | None:
         margin = max(1, math.ceil(h.sizes[axis] * (factor - 1) / 2 - 1e-6))
         first = round(float(h[axis][0]) / side - 0.5)
         wider.append((np.arange(first - margin, first + h.sizes[axis] + margin) + 0.5) * side)
+    if wider[0].size * wider[1].size > _MOST_GROWN:
+        return None
     heights = evaluate(wider[0][:, None] - centre[0], wider[1] - centre[1])
     line = f"grown from {h.sizes['x']} x {h.sizes['y']} to {heights.shape[0]} x {heights.shape[1]} cells"
     return noted(with_coordinates(heights, *wider, h.attrs), line)
