@@ -13,9 +13,8 @@ from __future__ import annotations
 
 import math
 import os
-import threading
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 from typing import Any, Literal
 
@@ -23,7 +22,7 @@ import numpy as np
 import scipy
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.body import HALF_SPACE, Kernel, free_space_symbol, periodic_symbol
+from roughvisc.mechanics.body import HALF_SPACE, Kernel, periodic_symbol
 
 try:
     import ducc0
@@ -39,6 +38,8 @@ ROWS, COLUMN_BYTES, COLUMNS = 64, 1 << 18, 32
 #: Cells of a field from which blocks are transformed on several threads, and periodic fields in blocks at all: each
 #: block has the same bits on any number of threads. Measured: slower at 512 squared, faster at 1024.
 THREADED_FROM = 1024**2
+#: Unused elements after each row of a work array: rows a power of two apart take a tenth more time at 1,024 squared.
+APART = 16
 #: Cells a side of a block of the coarse grid.
 COARSE = 8
 
@@ -70,13 +71,13 @@ def arrays_of(device: str) -> Any:
     try:
         import cupy
 
-        problem = "" if cupy.cuda.runtime.getDeviceCount() > 0 else "CuPy finds none on this machine"
+        if cupy.cuda.runtime.getDeviceCount() > 0:
+            return cupy
+        problem = "CuPy finds none on this machine"
     except (ImportError, RuntimeError) as error:  # RuntimeError: of the CUDA driver
         problem = str(error)
-    if problem:
-        expected = f"'cpu', or a GPU with CuPy, pip install 'roughvisc[gpu]' ({problem})"
-        raise InputError(key="device", found="gpu", expected=expected)
-    return cupy
+    expected = f"'cpu', or a GPU with CuPy, pip install 'roughvisc[gpu]' ({problem})"
+    raise InputError(key="device", found="gpu", expected=expected)
 
 
 def to_host(array: Array) -> np.ndarray:
@@ -123,8 +124,6 @@ class Grid:
         mean over all cells. [m]
     convolutions : int
         Number of convolutions so far, applications of the inverse included.
-    threads : int
-        Threads that work on one field.
 
     Raises
     ------
@@ -157,13 +156,13 @@ class Grid:
         number = np.arange(self.symbol.shape[1])  # of the wave along y, which stands for the negative number too
         twice = (boundary != "mirror") & (number > 0) & (2 * number < self.points[1])
         self.self_influence = float((self.symbol.sum(axis=0) * xp.asarray(1.0 + twice)).sum()) / math.prod(self.points)
-        self.convolutions, self.threads = 0, threads_of(self.size) if xp is np else 1
-        self._transforms = transforms(self.threads, xp)
-        #: Whether a convolution is one call of :meth:`CupyTransforms.convolved`.
-        self._on_device = boundary == "periodic" and xp is not np
-        self._divisor = self.size if self._on_device and not self._transforms.normalise else 1
-        self._acting = self.symbol if self._divisor == 1 else self.symbol / self._divisor
-        self._memories: dict[Any, Array] = {}
+        self.convolutions = 0
+        self._transforms, self._block_transforms = transforms(self.size, xp), transforms(xp=xp)
+        #: Work array of all convolutions: new memory takes up to a third of the processor time at 2,048 squared.
+        self._work: Array | None = None
+        #: Whether a convolution calls cuFFT, which has no plans if a side is one cell, and does not normalise.
+        self._by_cufft = boundary == "periodic" and hasattr(xp, "RawKernel") and 1 not in shape
+        self._acting = self.symbol / self.size if self._by_cufft else self.symbol
 
     # ----------------------------------------------------------------------------------------- other grids and kernels
 
@@ -185,9 +184,18 @@ class Grid:
         return (rows[:, None] * self.coarse.shape[1] + columns).astype(np.int32).reshape(-1)
 
     def symbol_of(self, kernel: Kernel, is_whole: bool = True) -> np.ndarray:
-        """Return the transform of a kernel, see :func:`~roughvisc.mechanics.body.periodic_symbol`. [m]"""
+        """Return the transform of a kernel, see :func:`~roughvisc.mechanics.body.periodic_symbol`. [m]
+
+        Notes
+        -----
+        In free space the kernel fills every offset of the padded grid, even the offset at half its length, at which no
+        pair of cells lies. With a zero there the symbol becomes negative for slender cells (aspect 16: -1.5), and its
+        inverse is useless as a preconditioner.
+        """
         if self.boundary == "free":
-            return free_space_symbol(kernel, self.points, self.spacing)
+            offsets = self.points[0] // 2 + 1, self.points[1] // 2 + 1
+            symbol = scipy.fft.dctn(kernel.influence(offsets, self.spacing), type=1)  # of the even extension
+            return np.concatenate([symbol, symbol[-2:0:-1]])
         symbol = periodic_symbol(kernel, self.period, self.spacing, is_whole)
         # without the shortest waves of a mirrored surface, which are zero at the cells
         return np.ascontiguousarray(symbol[: self.shape[0], : self.shape[1]])
@@ -200,7 +208,6 @@ class Grid:
         Under periodic and mirror boundaries the mean displacement of a
         half-space is zero.
         """
-        self.convolutions += 1
         return self._convolved(pressure, self._acting, self.points)
 
     def inverse(self, displacement: Array) -> Array:
@@ -214,7 +221,6 @@ class Grid:
         displacement : array of float32, shape (nx, ny)
             Displacement, scaled to about one, because single precision underflows. [m]
         """
-        self.convolutions += 1
         return self._convolved(displacement, self._inverse_symbol, self.shape)
 
     @cached_property
@@ -223,32 +229,35 @@ class Grid:
         if self.boundary == "free":
             symbol = self.xp.asarray(periodic_symbol(self.kernel, self.shape, self.spacing))
         symbol[0, 0] = float(symbol[0, 0]) or float(symbol.max()) or self.spacing[0]
-        return (1 / symbol / self._divisor).astype(np.float32)
+        return (1 / symbol / (self.size if self._by_cufft else 1)).astype(np.float32)
 
     def _convolved(self, field: Array, symbol: Array, points: tuple[int, int]) -> Array:
         """Return the convolution of a field with a symbol on a number of points."""
+        self.convolutions += 1
         fft = self._transforms
         if self.boundary == "mirror":
             return fft.cosines_back(fft.cosines(field) * symbol)
-        if self._on_device:
-            return fft.convolved(field, symbol)
+        if self._by_cufft:
+            return convolved_by_cufft(fft.fft, field, symbol)
         if points == self.shape and self.size < THREADED_FROM:
             spectrum = fft.waves(field)
             spectrum *= symbol
             return fft.waves_back(spectrum, points)
         # Zeros are not transformed along y. Blocks of rows and of columns stay in the cache, each on one thread.
-        (nx, ny), count, fft = self.shape, points[1] // 2 + 1, transforms(1, self.xp)
-        spectrum = self._memory((nx, count), np.result_type(field.dtype, np.complex64))
+        (nx, ny), count, fft, threads = self.shape, points[1] // 2 + 1, self._block_transforms, self._transforms.threads
+        if self._work is None:
+            self._work = self.xp.empty(nx * (self.points[1] // 2 + 1), np.complex128)
+        spectrum = self._work.view(np.result_type(field.dtype, np.complex64))[: nx * count].reshape(nx, count)
         found = self.xp.empty((nx, ny), field.dtype)
-        rows, columns = ROWS, min(max(COLUMN_BYTES // (points[0] * spectrum.itemsize), COLUMNS), count)
+        rows, columns = ROWS, max(COLUMN_BYTES // (points[0] * spectrum.itemsize), COLUMNS)
         if self.xp is not np:
             rows, columns = nx, count
 
         def transform_rows(part: slice) -> None:
-            spectrum[part] = fft.waves(field[part], points[1], axes=(1,))
+            spectrum[part] = fft.waves(field[part], points[1:], axes=(1,))
 
         def convolve_columns(part: slice) -> None:
-            waves = self._memory((points[0], columns), spectrum.dtype)[:, : part.stop - part.start]
+            waves = self.xp.empty((points[0], spectrum[:1, part].size), spectrum.dtype)
             waves[:nx], waves[nx:] = spectrum[:, part], 0
             waves = fft.columns(waves)
             waves *= symbol[:, part]
@@ -257,21 +266,11 @@ class Grid:
         def rows_back(part: slice) -> None:
             found[part] = fft.waves_back(spectrum[part], points[1:], axes=(1,))[:, :ny]
 
-        on_threads(transform_rows, nx, rows, self.threads)
-        on_threads(convolve_columns, count, columns, self.threads)
-        on_threads(rows_back, nx, rows, self.threads)
+        run = map if threads == 1 else _pool(threads).map
+        for work, total, width in (transform_rows, nx, rows), (convolve_columns, count, columns), (rows_back, nx, rows):
+            parts = map(slice, range(0, total, width), range(width, total + width, width))
+            list(run(work, parts))  # waits for all parts, and raises an error of a part again
         return found
-
-    def _memory(self, shape: tuple[int, int], number: Any) -> Array:
-        """Return a complex work array, reused by each convolution.
-
-        New memory takes a tenth of the processor time of two threads at 1,024 squared, and of one at 2,048 squared.
-        """
-        key = shape, threading.get_ident()
-        if key not in self._memories:
-            self._memories[key] = self.xp.empty(shape, np.complex128)
-        memory = self._memories[key].reshape(-1).view(number)  # in either precision: one convolution at a time
-        return memory[: shape[0] * shape[1]].reshape(shape)
 
     # ----------------------------------------------------------------------------------------------------- transforms
 
@@ -301,22 +300,6 @@ class Grid:
 # ---------------------------------------------------------------------------------------------------------- threads
 
 
-def threads_of(size: int) -> int:
-    """Return the number of threads for a field of a number of cells: as set by ``scipy.fft.set_workers``, or one."""
-    return scipy.fft.get_workers() if size >= THREADED_FROM else 1
-
-
-def on_threads(work: Callable[[slice], Any], count: int, length: int, threads: int) -> None:
-    """Split `count` rows or columns into parts of a length, and call a function for each part on several threads."""
-    starts = range(0, count, length)
-    if threads == 1:
-        for start in starts:
-            work(slice(start, min(start + length, count)))
-        return
-    for _ in _pool(threads).map(lambda start: work(slice(start, min(start + length, count))), starts):
-        pass  # reraises an error of a part
-
-
 @cache
 def _pool(threads: int) -> ThreadPoolExecutor:
     """Return threads that all convolutions share: new ones would take a tenth of the processor time."""
@@ -330,32 +313,34 @@ if hasattr(os, "register_at_fork"):  # a forked process has none of the threads
 # ------------------------------------------------------------------------------------------------------- transforms
 
 
+@dataclass(frozen=True)
 class Transforms:
-    """Transforms along both axes, or one, by SciPy, or by CuPy. The way back may overwrite its argument."""
+    """Transforms along both axes, or one, by SciPy, or by CuPy. The way back may overwrite its argument.
 
-    #: Whether the inverse transform of :meth:`convolved` divides by the number of points.
-    normalise = True
+    Attributes
+    ----------
+    fft : module
+        Functions of the transforms.
+    threads : int
+        Threads that work on one field.
+    settings : dict
+        Argument of the functions that sets the threads, if they have one.
+    """
 
-    def __init__(self, threads: int, xp: Any) -> None:
-        self.fft, self.settings = fft_of(xp), {"workers": threads} if xp is np else {}
+    fft: Any
+    threads: int
+    settings: dict[str, int]
 
-    def waves(self, field: Array, points: int | None = None, axes: tuple[int, ...] = (0, 1)) -> Array:
+    def waves(self, field: Array, points: tuple[int, ...] | None = None, axes: tuple[int, ...] = (0, 1)) -> Array:
         """Return the Fourier transform of a field at non-negative wave numbers along y.
 
         With ``points`` and ``axes=(1,)`` the field is padded with zeros along y.
         """
-        return self.fft.rfftn(field, s=None if points is None else (points,), axes=axes, **self.settings)
+        return self.fft.rfftn(field, s=points, axes=axes, **self.settings)
 
     def waves_back(self, spectrum: Array, points: tuple[int, ...], axes: tuple[int, ...] = (0, 1)) -> Array:
         """Return the field of a Fourier transform."""
         return self.fft.irfftn(spectrum, s=points, axes=axes, overwrite_x=True, **self.settings)
-
-    def convolved(self, field: Array, symbol: Array) -> Array:
-        """Return the field of a Fourier transform times a symbol at all wave numbers along x.
-
-        If the inverse transform does not normalise, the symbol contains the factor.
-        """
-        return self.waves_back(self.waves(field) * symbol, field.shape)
 
     def columns(self, spectrum: Array, back: bool = False) -> Array:
         """Return the Fourier transform along x, or the inverse one, which may overwrite the spectrum."""
@@ -374,20 +359,18 @@ class Transforms:
 class DuccTransforms(Transforms):
     """Transforms by ducc0, which are faster."""
 
-    def __init__(self, threads: int, _: Any) -> None:
-        self.fft, self.settings = ducc0.fft, {"nthreads": threads}
-
-    def waves(self, field: Array, points: int | None = None, axes: tuple[int, ...] = (0, 1)) -> Array:
+    def waves(self, field: Array, points: tuple[int, ...] | None = None, axes: tuple[int, ...] = (0, 1)) -> Array:
         if points is not None:
-            longer = _apart((len(field), points), field.dtype)
+            longer = np.empty((len(field), points[0] + APART), field.dtype)[:, : points[0]]
             longer[:, : field.shape[1]], longer[:, field.shape[1] :] = field, 0
             field = longer
         return self.fft.r2c(field, axes=axes, **self.settings)
 
     def waves_back(self, spectrum: Array, points: tuple[int, ...], axes: tuple[int, ...] = (0, 1)) -> Array:
-        out = _apart((len(spectrum), points[-1]), spectrum.real.dtype) if axes == (1,) else None
         back = {"forward": False, "inorm": 2, "allow_overwriting_input": True, **self.settings}
-        return self.fft.c2r(spectrum, axes=axes, lastsize=points[-1], out=out, **back)
+        count = points[-1]
+        out = np.empty((len(spectrum), count + APART), spectrum.real.dtype)[:, :count] if axes == (1,) else None
+        return self.fft.c2r(spectrum, axes=axes, lastsize=count, out=out, **back)
 
     def columns(self, spectrum: Array, back: bool = False) -> Array:
         norm = 2 if back else 0
@@ -400,22 +383,19 @@ class DuccTransforms(Transforms):
         return self.fft.dct(spectrum, type=3, axes=(0, 1), inorm=2, out=spectrum, **self.settings)
 
 
-class CupyTransforms(Transforms):
-    """Transforms by CuPy. A convolution calls cuFFT: small transforms take less time than the functions of CuPy."""
+def convolved_by_cufft(fft: Any, field: Array, symbol: Array) -> Array:
+    """Return the field of a Fourier transform times a symbol that contains the factor of the inverse transform.
 
-    normalise = False
-
-    def convolved(self, field: Array, symbol: Array) -> Array:
-        if 1 in field.shape:  # cuFFT has no plan
-            return super().convolved(field, symbol * field.size)
-        forward, back = _plans(self.fft, field.shape, field.dtype.char)
-        field = field if field.flags.c_contiguous else field.copy()
-        spectrum = forward.get_output_array(field)
-        forward.fft(field, spectrum, _FORWARD)
-        spectrum *= symbol
-        found = back.get_output_array(spectrum)
-        back.fft(spectrum, found, _BACK)  # overwrites the spectrum
-        return found
+    It calls cuFFT: small transforms take less time than by the functions of CuPy.
+    """
+    forward, back = _plans(fft, field.shape, field.dtype.char)
+    field = field if field.flags.c_contiguous else field.copy()
+    spectrum = forward.get_output_array(field)
+    forward.fft(field, spectrum, _FORWARD)
+    spectrum *= symbol
+    found = back.get_output_array(spectrum)
+    back.fft(spectrum, found, _BACK)  # overwrites the spectrum
+    return found
 
 
 #: Directions of cuFFT.
@@ -432,16 +412,22 @@ def _plans(fft: Any, shape: tuple[int, int], number: str) -> tuple[Any, Any]:
     return fft.get_fft_plan(field, value_type="R2C"), fft.get_fft_plan(spectrum, shape=shape, value_type="C2R")
 
 
-def _apart(shape: tuple[int, int], number: Any) -> np.ndarray:
-    """Return an array with padded rows: rows a power of two apart take a tenth more time at 1,024 squared."""
-    return np.empty((shape[0], shape[1] + 16), number)[:, : shape[1]]
+def transforms(size: int = 0, xp: Any = np) -> Transforms:
+    """Return the transforms of a field: by ducc0 if it is installed and not refused, by SciPy, or by CuPy.
 
-
-def transforms(threads: int = 1, xp: Any = np) -> Transforms:
-    """Return the transforms of arrays of NumPy, by ducc0 if it is installed and not refused, or of CuPy."""
-    if xp is np and ducc0 is not None and os.environ.get("ROUGHVISC_TRANSFORMS") != "scipy":
-        return DuccTransforms(threads, xp)
-    return (CupyTransforms if hasattr(xp, "RawKernel") else Transforms)(threads, xp)
+    Parameters
+    ----------
+    size : int
+        Number of cells. Large fields of NumPy take the threads of ``scipy.fft.set_workers``.
+    xp : module
+        NumPy or CuPy.
+    """
+    if xp is not np:
+        return Transforms(fft_of(xp), 1, {})
+    threads = scipy.fft.get_workers() if size >= THREADED_FROM else 1
+    if ducc0 is not None and os.environ.get("ROUGHVISC_TRANSFORMS") != "scipy":
+        return DuccTransforms(ducc0.fft, threads, {"nthreads": threads})
+    return Transforms(scipy.fft, threads, {"workers": threads})
 
 
 def fft_of(xp: Any) -> Any:

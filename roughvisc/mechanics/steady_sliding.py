@@ -39,7 +39,7 @@ from scipy import fft
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.solver import unsolved
-from roughvisc.mechanics.grid import namespace, threads_of, transforms
+from roughvisc.mechanics.grid import namespace, transforms
 
 Array = Any  # an array of NumPy or CuPy
 
@@ -138,7 +138,7 @@ class Sliding:
         self.response = xp.asarray(displaced)
         self._skew = xp.asarray(skew)
         self._stiffness = xp.asarray((stiffness / stiffest).astype(np.complex64)), stiffest
-        self._transforms = transforms(threads_of(nx * ny), xp)
+        self._transforms = transforms(nx * ny, xp)
         #: Number of convolutions so far, including the preconditioner.
         self.convolutions = 0
         self.cell_area = dx * dy

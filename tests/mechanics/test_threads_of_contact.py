@@ -40,23 +40,22 @@ def test_contact__has_the_same_bits_on_any_threads(monkeypatch, boundary):
         assert one.approach == other.approach
 
 
-def doubled(queue):
-    field = np.ones(1000)
-    grids.on_threads(lambda part: np.multiply(field[part], 2, out=field[part]), 1000, 64, 2)
-    queue.put(float(field.sum()))
+def convolved(queue):
+    queue.put(float(on_threads(2, "free").displacement(np.ones((48, 37))).sum()))
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="a system without fork")
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
-def test_on_threads__works_in_a_forked_process_too():
+def test_convolution_on_threads__works_in_a_forked_process_too(monkeypatch):
     """A forked process has none of the threads of its parent."""
+    monkeypatch.setattr(grids, "THREADED_FROM", 1)
     context = multiprocessing.get_context("fork")
     queue = context.Queue()
-    doubled(queue)
-    assert queue.get(timeout=30) == 2000.0
-    child = context.Process(target=doubled, args=(queue,))
+    convolved(queue)
+    expected = queue.get(timeout=30)
+    child = context.Process(target=convolved, args=(queue,))
     child.start()
     try:
-        assert queue.get(timeout=30) == 2000.0
+        assert queue.get(timeout=30) == expected
     finally:
         child.kill()
