@@ -15,7 +15,7 @@ from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.labels import warnings_of
-from roughvisc.mechanics.body import Body, as_body
+from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.program import Direction, Program
 from roughvisc.settings import Boundary, Edge, Missing, Numerics, Problem, Settings
@@ -237,7 +237,8 @@ def _solved(
     """
     if not isinstance(numerics, Numerics):
         raise InputError(key="numerics", found=numerics, expected="rv.Numerics(...)")
-    problem = Problem(height, as_body(material), Settings(**vars(numerics), **settings))
+    body = material if isinstance(material, Body) else Body(material)
+    problem = Problem(height, body, Settings(**vars(numerics), **settings))
     dataset = solve(problem, experiment, **options)
     for subject, text in warnings_of(dataset.attrs).items():
         if subject in ("tolerance", "material"):

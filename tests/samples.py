@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import roughvisc as rv
-from roughvisc.mechanics.body import Kernel, love_kernel
+from roughvisc.mechanics.body import HALF_SPACE, Kernel
 
 #: Contact modulus 1.
 UNIT = rv.elastic(0.25)
@@ -44,7 +44,7 @@ class Scaled(Kernel):
     raises_surface: bool = False
 
     def influence(self, shape, spacing):
-        return self.factor * love_kernel(shape, spacing)
+        return self.factor * HALF_SPACE.influence(shape, spacing)
 
     def transfer(self, qx, qy):
         magnitude = np.hypot(qx, qy)

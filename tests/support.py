@@ -10,7 +10,7 @@ from references.half_space import lee_radok_step
 from samples import RUBBER
 
 import roughvisc as rv
-from roughvisc.mechanics.body import love_kernel
+from roughvisc.mechanics.body import HALF_SPACE
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.memory import Memory
 from roughvisc.mechanics.stepping import Scene
@@ -96,7 +96,7 @@ def assert_same(one, other):
 def direct(pressure, spacing):
     """Superposition of cells, one by one."""
     nx, ny = pressure.shape
-    kernel = love_kernel(pressure.shape, spacing)
+    kernel = HALF_SPACE.influence(pressure.shape, spacing)
     i, j = np.arange(nx), np.arange(ny)
     influence = kernel[np.abs(i[:, None] - i)[:, None, :, None], np.abs(j[:, None] - j)[None, :, None, :]]
     return np.einsum("ijkl,kl->ij", influence, pressure)

@@ -18,7 +18,7 @@ from roughvisc.experiment.accuracy import area_error, border_warning, error_colu
 from roughvisc.experiment.base import Experiment, Outgrown, Row, Rows
 from roughvisc.experiment.profile import BEYOND, GROWTH, Domain, Profile, choose_surface
 from roughvisc.experiment.resources import WORTH_ASKING, require_loading
-from roughvisc.mechanics.body import Body, has_finite_mean
+from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.solver import contact_area
 from roughvisc.mechanics.grid import Grid, arrays_of, to_host
 from roughvisc.mechanics.memory import Choice, History
@@ -376,9 +376,9 @@ def check_program(profile: Profile, program: Program, boundary: str) -> None:
     """
     if not program.segments:
         raise InputError("the program is empty: expected at least one segment")
-    # Beyond full contact the approach does not determine the pressure. If cells are absent, the body bulges into
-    # them, and every approach has a definite force.
-    can_fill = boundary != "free" and profile.all_present and not has_finite_mean(profile.kernel)
+    # Beyond full contact the approach does not determine the pressure, unless a uniform pressure has a finite mean
+    # displacement. If cells are absent, the body bulges into them, and every approach has a definite force.
+    can_fill = boundary != "free" and profile.all_present and not profile.kernel.transfer(0.0, 0.0) > 0
     for number, (segment, end) in enumerate(zip(program.segments, program.corners[1:], strict=True)):
         where, shortest = f"program.{number}", min(segment.duration, segment.period)
         least = max(LEAST_ROUNDINGS * math.ulp(end), 1 / LARGEST)

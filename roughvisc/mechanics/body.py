@@ -18,7 +18,6 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import fft
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.creep import Material, check_material
@@ -100,8 +99,48 @@ class HalfSpace(Kernel):
     raises_surface = False
 
     def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
-        """Return :func:`love_kernel`. [m]"""
-        return love_kernel(shape, spacing)
+        r"""Return the surface displacement of the half-space under one uniformly loaded cell.
+
+        Parameters
+        ----------
+        shape : tuple of int
+            Number of cells ``(nx, ny)``.
+        spacing : tuple of float
+            Cell sides ``(dx, dy)``. [m]
+
+        Returns
+        -------
+        ndarray, shape (nx, ny)
+            Displacement at the cell centres for unit pressure on the cell at the origin and unit contact
+            compliance; relative error below 5e-15 at any distance for square cells, 1e-13 at an aspect of 16. [m]
+
+        Notes
+        -----
+        Love's closed form, ``P(a, b) = a asinh(b/|a|) + b asinh(a/|b|)`` summed over the four corners with
+        alternating signs, loses digits far from the cell, because the corner terms cancel. There Gauss quadrature of
+        ``1 / (pi r)`` over the cell replaces it.
+
+        References
+        ----------
+        .. [1] A. E. H. Love, Phil. Trans. R. Soc. A 228 (1929) 377.
+        .. [2] K. L. Johnson, *Contact Mechanics*, CUP, 1985, eq. (3.25).
+        """
+        longer = max(spacing)
+        dx, dy = spacing[0] / longer, spacing[1] / longer  # unit neutrality: all lengths in longer sides
+        x = np.arange(shape[0], dtype=float)[:, None] * dx
+        y = np.arange(shape[1], dtype=float)[None, :] * dy
+        distance = np.hypot(x, y)
+        kernel = np.empty(shape)
+
+        near = distance <= _GAUSS[0][0]
+        rows, columns = np.nonzero(near)
+        kernel[near] = corner_sum(x[rows, 0], y[0, columns], dx, dy)
+        for start, end, points in _GAUSS:
+            ring = (distance > start) & (distance <= end)
+            rows, columns = np.nonzero(ring)
+            mean = cell_mean(np.reciprocal, x[rows, 0], y[0, columns], (dx, dy), (points, points))
+            kernel[ring] = mean * (dx * dy)
+        return kernel * (longer / math.pi)
 
     def transfer(self, qx: ArrayLike, qy: ArrayLike) -> Array:
         """Return ``2 / |q|``; zero at ``q = 0``, since the mean displacement is undefined. [m]"""
@@ -111,51 +150,6 @@ class HalfSpace(Kernel):
 
 #: The default kernel.
 HALF_SPACE = HalfSpace()
-
-
-def love_kernel(shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
-    r"""Return the surface displacement of a half-space under one uniformly loaded cell.
-
-    Parameters
-    ----------
-    shape : tuple of int
-        Number of cells ``(nx, ny)``.
-    spacing : tuple of float
-        Cell sides ``(dx, dy)``. [m]
-
-    Returns
-    -------
-    ndarray, shape (nx, ny)
-        Displacement at the cell centres for unit pressure on the cell at the origin and unit contact
-        compliance; relative error below 5e-15 at any distance for square cells, 1e-13 at an aspect of 16. [m]
-
-    Notes
-    -----
-    Love's closed form, ``P(a, b) = a asinh(b/|a|) + b asinh(a/|b|)`` summed over the four corners with
-    alternating signs, loses digits far from the cell, because the corner terms cancel. There Gauss quadrature of
-    ``1 / (pi r)`` over the cell replaces it.
-
-    References
-    ----------
-    .. [1] A. E. H. Love, Phil. Trans. R. Soc. A 228 (1929) 377.
-    .. [2] K. L. Johnson, *Contact Mechanics*, CUP, 1985, eq. (3.25).
-    """
-    longer = max(spacing)
-    dx, dy = spacing[0] / longer, spacing[1] / longer  # unit neutrality: all lengths in longer sides
-    x = np.arange(shape[0], dtype=float)[:, None] * dx
-    y = np.arange(shape[1], dtype=float)[None, :] * dy
-    distance = np.hypot(x, y)
-    kernel = np.empty(shape)
-
-    near = distance <= _GAUSS[0][0]
-    rows, columns = np.nonzero(near)
-    kernel[near] = corner_sum(x[rows, 0], y[0, columns], dx, dy)
-    for start, end, points in _GAUSS:
-        ring = (distance > start) & (distance <= end)
-        rows, columns = np.nonzero(ring)
-        mean = cell_mean(np.reciprocal, x[rows, 0], y[0, columns], (dx, dy), (points, points))
-        kernel[ring] = mean * (dx * dy)
-    return kernel * (longer / math.pi)
 
 
 def corner_sum(x: Array, y: Array, dx: float, dy: float, depth: float = 0.0) -> Array:
@@ -208,39 +202,6 @@ def cell_mean(
         for b, part_b in zip(along_y * sides[1] / 2, share_y / 2, strict=True):
             total += part_a * part_b * function(np.sqrt(square + (y + b) ** 2))
     return total
-
-
-def has_finite_mean(kernel: Kernel) -> bool:
-    """Return whether the mean displacement under uniform pressure is finite, and known."""
-    return float(kernel.transfer(0.0, 0.0)) > 0
-
-
-def free_space_symbol(kernel: Kernel, padded: tuple[int, int], spacing: tuple[float, float]) -> Array:
-    """Return the symbol of a kernel on a zero-padded grid.
-
-    Parameters
-    ----------
-    kernel : Kernel
-        Kernel of the body.
-    padded : tuple of int
-        Even numbers of points, at least ``2 n - 1`` of the unpadded grid's along each axis.
-    spacing : tuple of float
-        Cell sides. [m]
-
-    Returns
-    -------
-    ndarray, shape (padded[0], padded[1] // 2 + 1)
-        Real; positive for a half-space. [m]
-
-    Notes
-    -----
-    The kernel fills every offset of the padded grid, even the offset at half its length, at which no pair of cells
-    lies. With a zero there the symbol becomes negative for slender cells (aspect 16: -1.5), and its inverse is useless
-    as a preconditioner.
-    """
-    offsets = (padded[0] // 2 + 1, padded[1] // 2 + 1)
-    symbol = fft.dctn(kernel.influence(offsets, spacing), type=1)  # the transform of the even extension
-    return np.concatenate([symbol, symbol[-2:0:-1]])
 
 
 def periodic_symbol(
@@ -366,11 +327,6 @@ class Body:
         if not self.material.stands_for:
             facts["poisson"] = self.material.poisson
         return facts
-
-
-def as_body(material: Any) -> Body:
-    """Return a body itself, or the half-space of a material."""
-    return material if isinstance(material, Body) else Body(material)
 
 
 def check_one_body(key: str, material: Any) -> None:

@@ -23,7 +23,7 @@ import scipy  # which imports a submodule when it is first used
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel, cell_mean, check_one_body, corner_sum, love_kernel
+from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel, cell_mean, check_one_body, corner_sum
 from roughvisc.mechanics.materials.creep import Material, Prony
 from roughvisc.mechanics.materials.series import laplace_compliance, lattice, nonnegative, over_frequencies
 from roughvisc.units import Quantity, format_quantity, quantities
@@ -190,7 +190,7 @@ class LayerKernel(Kernel):
         wanted = (np.append(self._along(np.log(q)), self.compliance[0]) - short) / scale
         rows = np.vstack([np.exp(-np.outer(q, depths)), np.ones(depths.size)]) / scale[:, None]
         weights = np.linalg.lstsq(rows, wanted, rcond=1e-13)[0]
-        return short * love_kernel(shape, spacing) + image_influence(shape, spacing, depths, weights)
+        return short * HALF_SPACE.influence(shape, spacing) + image_influence(shape, spacing, depths, weights)
 
     @cached_property
     def _along(self) -> Any:

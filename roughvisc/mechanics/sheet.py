@@ -15,7 +15,7 @@ import scipy  # which imports a submodule when it is first used
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.arguments import one_of
-from roughvisc.mechanics.body import Body, Kernel, cell_mean, check_one_body, love_kernel
+from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel, cell_mean, check_one_body
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.quadrature import panels
 from roughvisc.units import Quantity, number, quantities
@@ -140,7 +140,7 @@ class Sheet(Kernel):
         dx, dy = (side / self.thickness for side in spacing)
         if max(dx, dy) > _GAUSS[-1][0]:
             return self._influence_of_long_cells(shape, spacing)
-        kernel = love_kernel(shape, spacing)
+        kernel = HALF_SPACE.influence(shape, spacing)
         x, y = np.broadcast_arrays(dx * np.arange(shape[0])[:, None], dy * np.arange(shape[1]))
         near = np.hypot(x, y) <= _REACH - math.hypot(dx, dy) / 2
         kernel[~near] = 0

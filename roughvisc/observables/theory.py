@@ -14,7 +14,7 @@ from scipy.special import erf
 from roughvisc.errors import InputError
 from roughvisc.experiment.sliding import SlidingGrid
 from roughvisc.labels import label
-from roughvisc.mechanics.body import Body, as_body
+from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.materials.creep import Material, check_material
 from roughvisc.mechanics.steady_sliding import Sliding
 from roughvisc.observables.frames import history, need
@@ -133,7 +133,7 @@ def persson(dataset: xr.Dataset, material: Material | Body) -> xr.Dataset:
     """
     if not {"height", "nominal_pressure", "speed"} <= set(dataset.variables) or "direction" not in dataset.attrs:
         raise InputError(key="dataset", found=list(dataset.variables), expected="a result of rv.friction with height")
-    body = as_body(material)
+    body = material if isinstance(material, Body) else Body(material)
     height = dataset["height"]
     grid = SlidingGrid.of(-height.values, spacing(height, "height"), dataset.attrs["direction"])
     found = []

@@ -14,7 +14,6 @@ from support import BALL
 import roughvisc as rv
 from roughvisc.cli import main
 from roughvisc.experiment.loading import Loading
-from roughvisc.mechanics.body import as_body
 from roughvisc.settings import Problem, Settings
 from roughvisc.solve import solve
 from roughvisc.study.storage.checkpoint import CheckpointWriter
@@ -95,7 +94,7 @@ def test_friction__on_a_device_is_that_of_a_cpu(gpu, boundary):
 def test_run__that_was_stopped_on_a_device_continues_to_the_same_bits(gpu, name, tmp_path):
     height, body, program, settings = SCENES[name]
     settings = Settings(times=6, **({"boundary": "free"} | settings), device="gpu")
-    problem = Problem(height, as_body(body), settings)
+    problem = Problem(height, body if isinstance(body, rv.Body) else rv.Body(body), settings)
     whole = solve(problem, Loading(program))
     count = iter(range(1000))
     stopped = CheckpointWriter(tmp_path / "run", seconds=0, stop=lambda: next(count) == 4)

@@ -4,7 +4,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from roughvisc.mechanics.body import HALF_SPACE, free_space_symbol, love_kernel
+from roughvisc.mechanics.body import HALF_SPACE
+from roughvisc.mechanics.grid import Grid
 
 
 def love_exact(x, y, dx, dy):
@@ -21,8 +22,8 @@ def love_exact(x, y, dx, dy):
 @pytest.mark.parametrize(
     ("spacing", "error"), [((1.0, 1.0), 1e-14), ((3.0, 0.75), 2e-14), ((1.0, 16.0), 2e-13)], ids=["1", "4", "16"]
 )
-def test_love_kernel__is_exact_at_any_distance(spacing, error):
-    kernel = love_kernel((801, 301), spacing)
+def test_influence_of_half_space__is_exact_at_any_distance(spacing, error):
+    kernel = HALF_SPACE.influence((801, 301), spacing)
     rng = np.random.default_rng(3)
     cells = [(0, 0), (0, 1), (1, 0), (4, 0), (0, 5), (17, 1), (41, 3), (200, 1), (800, 300)]
     cells += [(int(i), int(j)) for i, j in rng.integers(0, (801, 301), (30, 2))]
@@ -33,5 +34,5 @@ def test_love_kernel__is_exact_at_any_distance(spacing, error):
 
 @pytest.mark.parametrize("aspect", [1, 4, 16])
 def test_free_space_symbol__is_positive(aspect):
-    symbol = free_space_symbol(HALF_SPACE, (64, 48), (1.0, float(aspect)))
+    symbol = Grid((32, 24), (1.0, float(aspect))).symbol
     assert symbol.min() > 0.5  # of the short side; zero at the middle offset would make it negative

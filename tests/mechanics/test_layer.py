@@ -8,7 +8,7 @@ from scipy.special import j0
 from support import refused
 
 import roughvisc as rv
-from roughvisc.mechanics.body import love_kernel
+from roughvisc.mechanics.body import HALF_SPACE
 from roughvisc.mechanics.layer import effective_compliance
 
 
@@ -31,7 +31,7 @@ def test_kernel__its_transform_is_the_exact_response_between_its_waves_too(ratio
 def test_kernel__in_free_space_is_the_transform_of_its_response(ratio, relative):
     """At distances of one and of three thicknesses. A cell's mean differs from its centre by the square of the cell."""
     kernel, side = elastic((1.0,), (0.5, 0.3), (1.0, ratio)), 0.05
-    found, love = kernel.influence((61, 2), (side, side)), love_kernel((61, 2), (side, side))
+    found, love = kernel.influence((61, 2), (side, side)), HALF_SPACE.influence((61, 2), (side, side))
     nodes, weights = np.polynomial.legendre.leggauss(20)
     ends = np.concatenate([[0], np.geomspace(1e-8, 1e-2, 200), np.linspace(1e-2, 30, 600)[1:]])
     halves = np.diff(ends)[:, None] / 2
