@@ -447,7 +447,7 @@ class Program:
                 end = None if one.end is None else float(f"{one.end * size:.15g}")
                 one = replace(one, control="load", end=end, amplitude=float(f"{one.amplitude * size:.15g}"))
             segments.append(one)
-        return replace(self, segments=tuple(segments))
+        return self if tuple(segments) == self.segments else replace(self, segments=tuple(segments))
 
     @cached_property
     def slides(self) -> bool:
