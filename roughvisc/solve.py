@@ -150,7 +150,7 @@ def solve(
     with fft.set_workers(threads):
         with bar as report:
             dataset = solve_on_grid(problem, experiment, recorder or Recorder(), report)
-        if settings.grid_error and isinstance(experiment, Loading):
+        if runs_again:
             # coarser grids may have another area: convert nominal pressures to loads on the given area
             loads = Loading(experiment.program.on_area(nominal_area(height)))
 

@@ -267,7 +267,7 @@ class LoadingRows(Rows):
             mean_gap = float((gap if present is None else gap[present]).mean())
         else:
             effective = to_host(displaced[-1])
-            mean_gap = profile.mean_gap + domain.mean_displacement(effective) - point.approach
+            mean_gap = profile.mean_gap + float((effective * domain.mean_influence).sum()) - point.approach
         row: dict[str, Any] = stated | {
             "force": point.force,
             "approach": point.approach,

@@ -149,17 +149,13 @@ class Domain:
         whole[self.cells] = effective
         return self._whole.displacement(whole)
 
-    def mean_displacement(self, effective: Array) -> float:
-        """Return the mean displacement of the whole surface. [m]"""
-        return float((effective * self._mean_influence).sum())
-
     @cached_property
     def _whole(self) -> Grid:
         return Grid(self.shape, self.spacing, "free", kernel=self.kernel)
 
     @cached_property
-    def _mean_influence(self) -> Array:
-        """Mean displacement of the surface under unit pressure on each cell: the kernel is symmetric. [m]"""
+    def mean_influence(self) -> Array:
+        """Mean displacement of the whole surface under unit pressure on each cell: the kernel is symmetric. [m]"""
         return self._whole.displacement(np.full(self.shape, 1 / math.prod(self.shape)))[self.cells]
 
 
