@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -19,7 +19,7 @@ from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.program import Direction, Program
 from roughvisc.settings import Boundary, Edge, Missing, Numerics, Problem, Settings
-from roughvisc.solve import solve
+from roughvisc.solve import Progress, solve
 from roughvisc.study import storage as storage  # registers ds.roughvisc
 from roughvisc.units import Quantity, quantities
 
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from roughvisc.study.case import Case
 
 log = logging.getLogger("roughvisc")
-Progress = Callable[[float, float], None]
 
 
 def simulate(

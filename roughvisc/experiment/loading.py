@@ -97,7 +97,6 @@ class Loading(Experiment):
         before = (None, 0) if state is None else (state.enlarged, state.outgrown)
         profile, domain, enlarged, reaches_border = choose_surface(given, problem, program, *before)
         gap = np.ascontiguousarray(profile.gap[domain.cells])
-        present = None if profile.all_present else profile.present[domain.cells]
         grid = Grid((gap.shape[0], gap.shape[1]), profile.spacing, settings.boundary, kernel=profile.kernel, xp=xp)
         choice = memory_of(body, program, settings, grid=grid, keeps_pressure=not domain.is_whole)
         log.info("memory: %s", choice.note)
@@ -109,7 +108,7 @@ class Loading(Experiment):
             kept=kept_times(program, settings.times, profile.spacing),
             tolerance=settings.tolerance,
             time_step=None if settings.time_step == "auto" else settings.time_step,
-            present=None if present is None else xp.asarray(present),
+            present=None if profile.all_present else xp.asarray(profile.present[domain.cells]),
         )
         return LoadingRows(
             problem=replace(problem, height=profile.height),

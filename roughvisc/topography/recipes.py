@@ -541,8 +541,7 @@ RECIPES: dict[str, Callable[..., xr.DataArray]] = {
     recipe.__name__: recipe for recipe in (sphere, cone, flat_punch, wavy, self_affine)
 }
 #: Boundary for which the surfaces of each recipe are made.
-BOUNDARIES: dict[str, Literal["free", "periodic"]] = dict.fromkeys(("sphere", "cone", "flat_punch"), "free")
-BOUNDARIES |= dict.fromkeys(("wavy", "self_affine"), "periodic")
+BOUNDARIES: dict[str, str] = {name: "free" if name in _INDENTERS else "periodic" for name in RECIPES}
 
 
 def check_recipe(where: str, table: Mapping[str, Any]) -> None:

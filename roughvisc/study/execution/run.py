@@ -22,16 +22,10 @@ from roughvisc.errors import InputError, RoughviscError
 from roughvisc.labels import warnings_of
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.settings import Problem
-from roughvisc.solve import solve
+from roughvisc.solve import Progress, solve
 from roughvisc.study.case import Case, labels_of, program_version
 from roughvisc.study.storage.checkpoint import CheckpointWriter
-from roughvisc.study.storage.folder import (
-    case_path,
-    existing_part,
-    lock_case,
-    require_writable,
-    unusable,
-)
+from roughvisc.study.storage.folder import case_path, existing_part, lock_case, require_writable, unusable
 from roughvisc.study.storage.netcdf import DamagedError, open_result, write_result
 from roughvisc.study.storage.sweep_data import Entry, read_entry
 
@@ -40,7 +34,6 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("roughvisc")
 
-Progress = Callable[[float, float], None]
 #: Facts that a stored result omits, because its attribute ``case`` determines them.
 _IN_THE_CASE = ("compliance_at_end", "poisson", "time_scale", "base")
 #: How a case ended. ``hindered``: stopped by a cause outside the case (a full disk, too little memory, a killed
