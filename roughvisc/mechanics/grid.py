@@ -145,12 +145,10 @@ class Grid:
         images = 2 if boundary == "mirror" else 1
         self.period = images * shape[0], images * shape[1]
         self.size, self.cell_area = shape[0] * shape[1], spacing[0] * spacing[1]
-        self.points = shape
+        self.points, fast = shape, scipy.fft.next_fast_len
         if boundary == "free":
-            fast = scipy.fft.next_fast_len
-            self.points = 2 * int(fast(shape[0], real=True)), 2 * int(fast(shape[1], real=True))
-        symbol = self.symbol_of(kernel) if symbol is None else symbol
-        self.symbol = xp.asarray(symbol)
+            self.points = 2 * fast(shape[0], real=True), 2 * fast(shape[1], real=True)
+        self.symbol = xp.asarray(self.symbol_of(kernel) if symbol is None else symbol)
         self.definite = boundary == "free" or float(self.symbol[0, 0]) > 0
         self.stiffest = float(self.symbol.max()) or spacing[0]
         number = np.arange(self.symbol.shape[1])  # of the wave along y, which stands for the negative number too
@@ -373,8 +371,7 @@ class DuccTransforms(Transforms):
         return self.fft.c2r(spectrum, axes=axes, lastsize=count, out=out, **back)
 
     def columns(self, spectrum: Array, back: bool = False) -> Array:
-        norm = 2 if back else 0
-        return self.fft.c2c(spectrum, axes=(0,), forward=not back, inorm=norm, out=spectrum, **self.settings)
+        return self.fft.c2c(spectrum, (0,), forward=not back, inorm=2 if back else 0, out=spectrum, **self.settings)
 
     def cosines(self, field: Array) -> Array:
         return self.fft.dct(field, type=2, axes=(0, 1), **self.settings)
