@@ -24,7 +24,6 @@ from roughvisc.experiment.loading import Loading
 from roughvisc.labels import CARRIED, TITLE, label
 from roughvisc.settings import Problem
 from roughvisc.topography.grid import nominal_area
-from roughvisc.topography.recipes import highest
 from roughvisc.variables import OF_STEPS, STEP, STEPPED, VARIABLES
 
 log = logging.getLogger("roughvisc")
@@ -208,7 +207,7 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     height, settings, axis = rows.problem.height, rows.problem.settings, experiment.axis
     steps = pd.DataFrame(recorder.plain)
     kept = steps[steps["kept"]]
-    attributes: dict[str, Any] = {"highest": highest(height)}
+    attributes: dict[str, Any] = {"highest": rows.profile.highest}
     for name in _ORIGIN:
         if name in height.attrs:
             attributes[name] = height.attrs[name]

@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.body import Body
 from roughvisc.settings import Problem, Settings
 
@@ -59,11 +60,14 @@ class Rows(ABC):
     ----------
     problem : Problem
         The problem solved; its surface may be larger than the surface of the given problem.
+    profile : Profile
+        Arrays of this surface.
     end : float
         End of the experiment, in the unit of :attr:`Row.done`.
     """
 
     problem: Problem
+    profile: Profile
     end: float
 
     @abstractmethod

@@ -24,7 +24,7 @@ from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.program import Program
 from roughvisc.settings import Missing, Problem, Settings
 from roughvisc.topography.grid import spacing
-from roughvisc.topography.recipes import grown, highest, indenter_of
+from roughvisc.topography.recipes import grown, indenter_of
 
 Array = NDArray[np.float64]
 #: Number of cells along the longer side of the grid of the estimate, and tolerance of the estimate.
@@ -57,6 +57,9 @@ class Profile:
     ----------
     present : ndarray of bool, shape (nx, ny)
         Cells with material.
+    highest : float
+        Height of first contact: the apex of an indenter, also between cells, or the highest cell. The apex counts if
+        the recipe reproduces the heights and the apex lies within the outline of the cells. [m]
     gap : ndarray, shape (nx, ny)
         Undeformed gap at first touch, zero at absent cells. [m]
     least_gap, mean_gap : float
@@ -88,7 +91,14 @@ class Profile:
                 "if there is no material"
             )
         self.height, self.kernel = height, kernel
-        self.gap = highest(height) - values
+        self.highest, indenter = float(np.nanmax(values)), indenter_of(height)
+        if indenter is not None:
+            sides, apex = np.array(indenter[1]), np.array(indenter[2])
+            x, y = height["x"].values, height["y"].values
+            first, last = np.array([x[0], y[0]]) - sides / 2, np.array([x[-1], y[-1]]) + sides / 2
+            if (first <= apex).all() and (apex <= last).all():
+                self.highest = 0.0
+        self.gap = self.highest - values
         self.least_gap = float(np.nanmin(self.gap))
         self.gap[~self.present] = 0.0
         self.mean_gap = float(np.sum(self.gap)) / np.count_nonzero(self.present)

@@ -180,7 +180,7 @@ class SlidingRows(Rows):
         require_memory(shape, partial(curve_bytes, settings), device=settings.device)
         if not profile.all_present:  # a punch has absent cells by its recipe
             raise InputError("height is missing at some points: expected none, because the surface repeats")
-        self.problem, self.end, self._profile = replace(problem, height=profile.height), len(curve.speeds), profile
+        self.problem, self.end, self.profile = replace(problem, height=profile.height), len(curve.speeds), profile
         self._force = float(curve.load) if curve.load is not None else float(curve.pressure or 0.0) * profile.area
         #: The grid of the surface, and up to two coarser grids for the error of the grid.
         self._grids = [SlidingGrid.of(profile.gap, profile.spacing, curve.direction)]
@@ -218,7 +218,7 @@ class SlidingRows(Rows):
             pressure, creep = states[0][2], 0.0
             if self._settings.grid_error:
                 row |= sliding_grid_errors(self._grids, pressure, runs)
-            if stands_alone(self._profile.height, pressure, 0):
+            if stands_alone(self.profile.height, pressure, 0):
                 for one in law.materials:  # without an end of the creep nothing counts as recovered
                     crept = float(one.contact_compliance(self._period / speed))
                     creep = max(creep, 1.0 - crept / float(one.contact_compliance(math.inf)))
@@ -229,7 +229,7 @@ class SlidingRows(Rows):
         self, found: SteadyState, sliding: Sliding, pressure: Array, gap: Array, counted: float, area: float
     ) -> tuple[dict[str, Any], dict[str, Array]]:
         """Return the variables of a steady state, and its fields in the frame of the surface."""
-        force, nominal, quarters = self._force, self._profile.area, _QUARTERS[self._curve.direction]
+        force, nominal, quarters = self._force, self.profile.area, _QUARTERS[self._curve.direction]
         status = "full_contact" if (pressure > 0).all() else "converged"
         row = {
             "force": force,
@@ -250,7 +250,7 @@ class SlidingRows(Rows):
         fields = {}
         for name in self._settings.fields:
             turned = np.rot90({"pressure": pressure, "gap": gap}[name], -quarters)
-            fields[name] = np.ascontiguousarray(np.broadcast_to(turned, self._profile.gap.shape))
+            fields[name] = np.ascontiguousarray(np.broadcast_to(turned, self.profile.gap.shape))
         return row, fields
 
     def finish(self, dataset: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:

@@ -346,31 +346,6 @@ def remade(h: xr.DataArray, shape: tuple[int, int]) -> xr.DataArray | None:
     return _indenter(recipe["name"], recipe["parameters"], recipe["size"], shape)
 
 
-def highest(h: xr.DataArray) -> float:
-    """Return the height of first contact: the apex of an indenter, also between cells, or the highest cell. [m]
-
-    The apex counts if the recipe reproduces the heights and the apex lies within the outline of the cells.
-
-    Parameters
-    ----------
-    h : xarray.DataArray
-        Height over (x, y); finite somewhere. [m]
-
-    Examples
-    --------
-    >>> tip = cone(0.5, 4.0, 4)
-    >>> highest(tip), float(tip.max()) < -0.3, highest(tip + 1.0) == float(tip.max()) + 1.0
-    (0.0, True, True)
-    """
-    known, highest_cell = indenter_of(h), float(np.nanmax(h.values))
-    if known is None:
-        return highest_cell
-    for axis, side, centre in zip("xy", *known[1:], strict=True):
-        if not float(h[axis][0]) - side / 2 <= centre <= float(h[axis][-1]) + side / 2:
-            return highest_cell
-    return 0.0
-
-
 # ------------------------------------------------------------------------------------------------------ random surfaces
 
 

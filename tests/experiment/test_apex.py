@@ -41,6 +41,14 @@ def test_approach__is_of_second_order_on_even_and_odd_grids(name, parity):
     assert -np.polyfit(np.log(radii), np.log(errors), 1)[0] > 1.3
 
 
+def test_highest__is_the_apex_within_the_cells_of_an_unchanged_indenter():
+    tip = rv.cone(0.5, 4.0, 8)
+    beside = tip.isel(x=slice(5, None))  # the apex is outside
+    for height, highest in ((tip, 0.0), (tip + 1.0, float(tip.max()) + 1.0), (beside, float(beside.max()))):
+        ds = pressed(height, rv.Program().load(1e-3, over=0), edge="accept")
+        assert ds.height.attrs["highest"] == highest
+
+
 def test_open__the_approach_is_that_of_the_highest_cells():
     """An even grid touches where its cells do, later than its apex."""
     height, side = rv.cone(0.5, 1.0, 10), 0.1
