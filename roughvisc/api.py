@@ -71,8 +71,8 @@ def simulate(
         If rows exceed it, a ``UserWarning`` and the attribute ``warnings`` count them. The grid error is not included.
     times : int or sequence of float or str, optional
         Output times, reached exactly: how many, counting time zero and the corners of the program, the others where the
-        result changes most; a list; or None, in a study ``"all"``, for all corners and every accepted step that meets
-        the tolerance. [s]
+        result changes most; a list; or None, in a study ``"all"``, for all corners and every accepted step whose stated
+        error is at most half the tolerance. [s]
     fields : sequence of str
         Fields to keep: any of ``pressure``, ``gap``, ``displacement``.
     missing : {"refuse", "absent"}

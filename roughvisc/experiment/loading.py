@@ -33,6 +33,10 @@ from roughvisc.variables import STATUS_MEANINGS
 log = logging.getLogger("roughvisc")
 Array = NDArray[np.float64]
 
+#: Largest stated error, over the tolerance, of a step that is kept because of it. Among steps that are chosen by their
+#: stated errors, those with too small ones are frequent: with 1 instead of 0.5, a third more steps are kept, but 17 of
+#: 184 random cases have a row beyond the tolerance instead of 6.
+CHOSEN = 0.5
 #: Times whose squares and products stay far from overflow. [s]
 LARGEST = 1e100
 #: A segment, or the period of a cycle, lasts at least this many units in the last place of its end: adding a millionth
@@ -204,7 +208,7 @@ class LoadingRows(Rows):
             kept = scene.keeps(point.time)
             if every:  # the length of fixed steps and of steps in a slide cannot be reduced
                 is_given = scene.time_step is not None or scene.program.segments[step.segment].slide is not None
-                kept = point.time in ends or is_given or stated["stated_error"] <= scene.tolerance
+                kept = point.time in ends or is_given or stated["stated_error"] <= CHOSEN * scene.tolerance
             largest = so_far if kept else largest
             values, fields = {}, {}
             if step.is_end:
