@@ -262,7 +262,7 @@ class LoadingRows(Rows):
         # the material. If the material itself ends, at an absent cell or at the border of a scan in free space, the
         # edge of the contact is known and the count is exact. A mirror plane is not an edge: cells adjoin their images.
         free, goes_on = ~contact if present is None else present & ~contact, not is_whole
-        counted, area = contact_area(contact, free, grid.cell_area, grid.boundary, goes_on)
+        counted, area, _ = contact_area(contact, free, grid.cell_area, grid.boundary, goes_on)
 
         is_full = is_whole and not bool(free.any())
         status = "open" if point.force == 0 else "full_contact" if is_full else "converged"

@@ -21,7 +21,7 @@ from roughvisc.experiment.grid_error import coarser_shape, counting_error, grid_
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.resources import curve_bytes, require_memory
 from roughvisc.mechanics.body import Body
-from roughvisc.mechanics.contact.solver import contact_area, faces_between
+from roughvisc.mechanics.contact.solver import contact_area
 from roughvisc.mechanics.grid import Boundary, arrays_of, to_host
 from roughvisc.mechanics.program import Direction
 from roughvisc.mechanics.steady_sliding import Sliding, SteadyState, steady_state
@@ -211,7 +211,7 @@ class SlidingRows(Rows):
                     raise ConvergenceError(f"at {format_quantity(speed, 'm/s')}: {error}; {advice}") from error
                 pressure, contact = to_host(found.pressure), to_host(found.pressure) > 0
                 gap = np.where(contact, 0.0, np.maximum(cells.gap + to_host(found.displacement) - found.approach, 0.0))
-                counted, area = contact_area(contact, ~contact, math.prod(cells.spacing), "periodic")
+                counted, area, _ = contact_area(contact, ~contact, math.prod(cells.spacing), "periodic")
                 states.append((found, sliding, pressure, gap, counted, area))
                 runs.append((found.power_force, area, found.approach, float(gap.mean())))
             row, fields = self._row(*states[0])  # on the grid of the surface
@@ -295,7 +295,8 @@ def sliding_grid_errors(
 
     contact = pressure > 0
     hidden_area, hidden_gap = hidden_opening(pressure, -grid.gap, True)
-    counting = _COUNTING_CAUTION * counting_error(contact, faces_between(contact, ~contact, "periodic"))
+    *_, faces = contact_area(contact, ~contact, 1.0, "periodic")
+    counting = _COUNTING_CAUTION * counting_error(contact, faces)
     # Friction from pressure times slope of the profile. The surface follows the profile at the centres of the contact
     # cells but not at the edges of contact; this is an error of the grid.
     inclined = float(np.sum(pressure * slope(grid.gap, grid.spacing[0], 0))) * grid.spacing[0] * grid.spacing[1]

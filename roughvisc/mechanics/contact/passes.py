@@ -81,11 +81,14 @@ def free_cells(
 def measure(pressure: Array, separation: Array, gap: Array, cells: Array, level: float, under_load: bool) -> Free:
     """Return pressure and residual at the free cells; under a load the residual has no mean."""
     held, at = pressure[cells], separation[cells]
-    residual = without_mean(at - level) if under_load else at - level
-    least, most = (float(at.min()), float(at.max())) if at.size else (level, 0.0)
+    residual = at - level
+    if not cells.size:
+        return Free(held, residual, 0.0, 0.0, 0.0, level, 0.0, 0.0, 0.0)
+    if under_load:
+        residual -= residual.sum() / cells.size
     weighted = inner(held, at)
     energy = max(weighted - inner(held, gap[cells]), 0.0)
-    size, highest = largest(abs(residual)), largest(held)
+    size, highest, least, most = map(float, (abs(residual).max(), held.max(), at.min(), at.max()))
     return Free(held, residual, size, float(held.sum()), highest, least, most, weighted, energy)
 
 
@@ -116,13 +119,16 @@ def conjugate(
     under_load : bool
         Whether the direction may not change the load.
     """
-    direction = without_mean(direction) if under_load else direction
+    if under_load:
+        direction -= direction.sum() / direction.size
     size = float(abs(direction).sum())
     if last is not None:
         old_cells, old_change, response, curvature = last
         beta = inner(direction, response[cells]) / curvature
         former = on_grid(old_change, old_cells).reshape(-1)[cells]
-        turned = direction - beta * (without_mean(former) if under_load else former)
+        if under_load:
+            former -= former.sum() / former.size
+        turned = direction - beta * former
         if beta > 0 and inner(turned, residual) > 0:
             direction = turned
     return direction, size
@@ -170,8 +176,9 @@ def line_search(
     if minimum <= 1:
         return curvature, minimum, minimum
     shrinking = change < 0
-    steepest = largest(-change[shrinking] / held[shrinking])
-    return curvature, minimum, min(minimum, 1 / steepest) if steepest > 0 else minimum
+    if not bool(shrinking.any()):
+        return curvature, minimum, minimum
+    return curvature, minimum, min(minimum, 1 / float((-change[shrinking] / held[shrinking]).max()))
 
 
 class Scatter:
@@ -264,16 +271,6 @@ def advance(
         trial = namespace(held).maximum(held + fraction * change, 0)
     pressure[cells] = trial
     separation += response if fraction == 1 else fraction * response
-
-
-def without_mean(values: Array) -> Array:
-    """Return a vector without its mean."""
-    return values - values.sum() / values.size
-
-
-def largest(values: Array) -> float:
-    """Return the largest value, but at least zero; a vector may be empty."""
-    return max(float(values.max()), 0.0) if values.size else 0.0
 
 
 def inner(one: Array, other: Array) -> float:

@@ -420,20 +420,13 @@ def neighbours(mask: Array, boundary: Boundary, outside: bool = False) -> Iterat
         yield from (lower, upper) if own is mask else (lower.T, upper.T)
 
 
-def faces_between(contact: Array, free: Array, boundary: Boundary, outside: bool = False) -> int:
-    """Return the number of faces between contact cells and free cells, see :func:`neighbours`."""
-    faces = 0
-    for beside in neighbours(free, boundary, outside):
-        faces += int(np.count_nonzero(contact & beside))
-    return faces
-
-
 def contact_area(
     contact: Array, free: Array, cell_area: float, boundary: Boundary, outside: bool = False
-) -> tuple[float, float]:
-    """Return the area of the cells in contact, counted and corrected for the grid. [m2]
+) -> tuple[float, float, int]:
+    """Return the area of the cells in contact [m2], and the number of their faces to free cells.
 
-    Counting cells overestimates the area by a part of the strip along the perimeter.
+    Counting cells overestimates the area by a part of the strip along the perimeter. The second area is corrected for
+    it.
 
     Parameters
     ----------
@@ -445,6 +438,6 @@ def contact_area(
         See :func:`neighbours`.
     """
     counted = int(np.count_nonzero(contact)) * cell_area
+    faces = sum(int(np.count_nonzero(contact & beside)) for beside in neighbours(free, boundary, outside))
     # a face across x is dy long and lies in a strip dx wide, and the other way round
-    strip = PERIMETER_CORRECTION * cell_area * faces_between(contact, free, boundary, outside)
-    return counted, max(counted - strip, 0.0)
+    return counted, max(counted - PERIMETER_CORRECTION * cell_area * faces, 0.0), faces
