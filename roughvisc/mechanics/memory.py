@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, Literal, cast
 
@@ -170,7 +170,8 @@ class Memory:
             if before[i]:
                 mode += before[i] * history.fields
             carried += self.weights[i] * mode[0]
-        return self.problem(carried, modes, new, step)
+        alpha = self.glassy + float((self.compliances * new).sum())
+        return Prediction(alpha, carried, modes, new, step)
 
     def advance(self, history: History, prediction: Prediction, unit: Array, pressure: Array) -> History:
         """Return the memory after a step.
@@ -191,23 +192,30 @@ class Memory:
         needed = self.may_ring and self.is_stiff(LARGEST_GROWTH * prediction.step)
         return History(fields, prediction.modes, history.modes if needed else None, prediction.step)
 
-    def displacement(self, history: History) -> Array:
-        """Return the displacement [m], and with ``k = 2`` the pressure that causes it, times a compliance [-]."""
-        total = self.weights[-1] * history.fields
-        for weight, mode in zip(self.weights[:-1], history.modes, strict=True):
-            total += weight * mode
-        return self.on_cells(total)
+    def displacement(self, history: History, left: Any = 1.0) -> Array:
+        """Return the displacement, and with ``k = 2`` the pressure that causes it.
 
-    def at_once(self, history: History) -> Array:
-        """Return the instantaneous part of the displacement. [m]"""
-        return self.on_cells(self.weights[-1] * history.fields[:1])[0]
+        Parameters
+        ----------
+        history : History
+            Memory at an instant.
+        left : float or ndarray, shape (m,)
+            Part of each mode that is left; zero gives the instantaneous displacement.
+
+        Returns
+        -------
+        array, shape (k, nx, ny)
+            Displacement [m], and pressure times a compliance [-].
+        """
+        total, parts = self.weights[-1] * history.fields, np.broadcast_to(left, self.times.shape)
+        for weight, part, mode in zip(self.weights[:-1], parts, history.modes, strict=True):
+            if part:
+                total += weight * (mode if part == 1 else part * mode)
+        return self.on_cells(total)
 
     def after_rest(self, history: History, time: float) -> Array:
         """Return the displacement after a time without pressure; the present pressure must be zero. [m]"""
-        own, total = self.recursion(time, 0.0, "linear")[0], self.weights[-1] * history.fields
-        for weight, part, mode in zip(self.weights[:-1], own, history.modes, strict=True):
-            total += (weight * part) * mode
-        return self.on_cells(total)[0]
+        return self.displacement(history, self.recursion(time, 0.0, "linear")[0])[0]
 
     # The methods below depend on the kept fields, which are transforms if the waves of a body creep differently.
 
@@ -218,11 +226,6 @@ class Memory:
     def on_cells(self, total: Array) -> Array:
         """Return the displacement on the cells. [m]"""
         return total
-
-    def problem(self, carried: Array, modes: Array, new: np.ndarray, step: float) -> Prediction:
-        """Return the elastic problem of a step from the displacement due to its history, see :class:`Prediction`."""
-        alpha = self.glassy + float((self.compliances * new).sum())
-        return Prediction(alpha, carried, modes, new, step)
 
     def unit(self, history: History) -> Array | None:
         """Return the displacement per unit compliance; None if the body has no common kernel. [m Pa]"""
@@ -317,13 +320,13 @@ class LayerMemory(Memory):
         """Return the displacement, shape (1, nx, ny). [m]"""
         return self.grid.field_of(total[0])[None]
 
-    def problem(self, carried: Array, modes: Array, new: np.ndarray, step: float) -> Prediction:
-        """Return the elastic problem of a step, with its kernel; its compliance is one, or zero if it is rigid."""
-        *symbols, at_once = self.weights
-        symbol = sum((part * one for part, one in zip(new, symbols, strict=True) if part), at_once)
-        cells, kernel = self.grid, self.waves.kernel(np.append(new, 1.0))
+    def predict(self, history: History, step: float, rule: Rule | None = None) -> Prediction:
+        """Return the elastic problem of a step [s], with its kernel; its compliance is one, or zero if it is rigid."""
+        found, (*symbols, at_once) = super().predict(history, step, rule), self.weights
+        symbol = sum((part * one for part, one in zip(found.new, symbols, strict=True) if part), at_once)
+        cells, kernel = self.grid, self.waves.kernel(np.append(found.new, 1.0))
         grid = Grid(cells.shape, cells.spacing, cells.boundary, kernel=kernel, symbol=symbol, xp=cells.xp)
-        return Prediction(float(symbol.any()), cells.field_of(carried), modes, new, step, grid)
+        return replace(found, compliance=float(symbol.any()), carried=cells.field_of(found.carried), grid=grid)
 
     def unit(self, history: History) -> None:
         """Return None: the kernel differs between steps."""

@@ -1,7 +1,7 @@
 """Loading programs: chains of segments that prescribe load, nominal pressure or approach over time.
 
 A program states values at corners only. The value that a hold keeps, or from which a ramp starts after a change of
-control, follows during the run and is an argument of :meth:`Segment.value`. :meth:`Program.on_area`
+control, follows during the run and is an argument of :meth:`Program.prescribed`. :meth:`Program.on_area`
 converts nominal pressures to loads on a known area.
 """
 
@@ -132,15 +132,6 @@ class Segment:
     def holds(self) -> bool:
         """Whether the controlled quantity and the position of the profile are constant."""
         return self.end is None and not self.amplitude and self.slide is None
-
-    def value(self, elapsed: float, start: float) -> float:
-        """Return the prescribed value at a time after the start [s]; ``start`` is the value at the start. [N or m]"""
-        end = start if self.end is None else self.end
-        if self.amplitude:
-            return end + self.amplitude * math.sin(2 * math.pi * elapsed / self.period)
-        if elapsed >= self.duration * (1 - 1e-12):  # times are sums of durations, rounded
-            return end
-        return start + (end - start) * (elapsed / self.duration)
 
     def turns(self, after: float, before: float) -> list[float]:
         """Return the turning points of a cycle strictly between two times since its start. [s]"""
@@ -462,6 +453,26 @@ class Program:
             if segment.amplitude:
                 found.append((start, segment.period, math.floor(segment.duration / segment.period * (1 + 1e-9))))
         return found
+
+    def prescribed(self, number: int, time: float, start: float) -> float:
+        """Return the prescribed value of segment `number` at a time [s].
+
+        Parameters
+        ----------
+        number : int
+            Index of the segment.
+        time : float
+            Time since the start of the program. [s]
+        start : float
+            Value at the start of the segment. [N or m]
+        """
+        segment, elapsed = self.segments[number], time - self.corners[number]
+        end = start if segment.end is None else segment.end
+        if segment.amplitude:
+            return end + segment.amplitude * math.sin(2 * math.pi * elapsed / segment.period)
+        if elapsed >= segment.duration * (1 - 1e-12):  # times are sums of durations, rounded
+            return end
+        return start + (end - start) * (elapsed / segment.duration)
 
     def gives(self, number: int) -> bool:
         """Return whether the program states the value of a segment; a hold may keep a computed value instead.

@@ -166,10 +166,6 @@ class Scene:
         """Return the least value over the present cells."""
         return float(values.min() if self.present is None else values[self.present].min())
 
-    def prescribed(self, number: int, time: float, point: Point) -> float:
-        """Return the prescribed value of a segment at a time [s], for the solution of a point in it. [N or m]"""
-        return self.program.segments[number].value(time - self.program.corners[number], point.start)
-
     def is_soft(self, step: float) -> bool:
         """Return whether hardly any compliance of a step is instantaneous. [s]"""
         return self.memory.compliance(0.0) < SOFT * self.memory.compliance(step)
@@ -386,7 +382,7 @@ def entered(scene: Scene, state: State) -> State:
     last, following = segments[index - 1], segments[min(index, len(segments) - 1)]
     changes, load = following.control != last.control, fine.force
     if last.duration == 0 and not scene.can_jump:
-        value = last.value(0.0, fine.start)
+        value = scene.program.prescribed(state.segment, fine.time, fine.start)
         if last.control == "load":
             load = value
         elif value != fine.approach:
@@ -595,8 +591,8 @@ def added(scene: Scene, state: State, second: Point, once: Point, force: float, 
     following = min(scene.next_kept(math.nextafter(second.time, 0)), scene.program.duration)
     # errors are relative to the largest values, including the next kept time
     end = scene.program.corners[state.segment + 1]
-    now = scene.prescribed(state.segment, second.time, second)
-    then = scene.prescribed(state.segment, min(following, end), second)
+    now = scene.program.prescribed(state.segment, second.time, second.start)
+    then = scene.program.prescribed(state.segment, min(following, end), second.start)
     ahead = max(then / now, 1.0) if now > 0 else 1.0
     force, approach = max(force, second.force * ahead), max(approach, abs(second.approach) * ahead**0.5)
     soft = scene.is_soft(taken)
@@ -646,7 +642,7 @@ def step_of_pair(
         return point, point
     ahead, value = END_STEP * (time - here.time), point.force
     if scene.program.segments[number].control == "approach":
-        value = 2 * point.approach - scene.prescribed(number, time - ahead, point)
+        value = 2 * point.approach - scene.program.prescribed(number, time - ahead, point.start)
     found = take_step(scene, without_past(point), time + ahead, number, value, rule="constant")
     return point, replace(found, time=time, approach=point.approach, before=point.before)
 
@@ -761,8 +757,8 @@ def work_of_step(scene: Scene, before: Point, after: Point, slides: bool = False
     """
     memory = scene.memory
     if after.time == before.time or (memory.is_elastic and not slides):
-        first = float((before.pressure * memory.at_once(before.history)).sum())
-        last = float((after.pressure * memory.at_once(after.history)).sum())
+        first = float((before.pressure * memory.displacement(before.history, 0.0)[0]).sum())
+        last = float((after.pressure * memory.displacement(after.history, 0.0)[0]).sum())
         return 0.5 * last * scene.grid.cell_area - 0.5 * first * scene.grid.cell_area
     if before.force == 0 == after.force:
         return 0.0
@@ -832,7 +828,7 @@ def take_step(
     """
     memory, step, area, segment = scene.memory, time - here.time, scene.grid.cell_area, scene.program.segments[number]
     by_load = segment.control == "load"
-    value = scene.prescribed(number, time, here) if value is None else value
+    value = scene.program.prescribed(number, time, here.start) if value is None else value
     prediction = memory.predict(here.history, step, "constant" if here.is_late else rule)
     alpha, gap, grid = prediction.compliance, prediction.carried, prediction.grid or scene.grid
     gap += scene.gap
@@ -891,7 +887,7 @@ def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> 
     def touching(left: float, right: float) -> float | None:
         """Return the last time between two times at which the surfaces are still apart; None if they stay apart."""
         level = scene.lowest(scene.gap + scene.memory.after_rest(here.history, right - now))
-        ends = [scene.prescribed(state.segment, time, here) for time in (left, right)]
+        ends = [scene.program.prescribed(state.segment, time, here.start) for time in (left, right)]
         if max(ends) <= level or (right - left <= shortest and ends[1] <= level):
             return None
         if right - left <= shortest:

@@ -15,8 +15,8 @@ def test_chain__adds_segments_in_order():
     program = rv.Program().load(2.0, over=0.5).hold(3.0, control="approach").approach(1e-6, over=0.0)
     assert [s.control for s in program.segments] == ["load", "approach", "approach"]
     assert program.corners == [0.0, 0.5, 3.5, 3.5]
-    assert program.segments[0].value(0.25, 0.0) == pytest.approx(1.0)
-    assert program.segments[1].value(1.0, 7e-6) == 7e-6
+    assert program.prescribed(0, 0.25, 0.0) == pytest.approx(1.0)
+    assert program.prescribed(1, 1.5, 7e-6) == 7e-6
     assert program.largest_load == 2.0
 
 
@@ -38,9 +38,8 @@ def test_table__ramps_between_rows_and_jumps_within_a_time():
 
 def test_cycle__is_a_sine_about_its_mean():
     program = rv.Program().load(3.0, over=1.0) + rv.Program.cycle(3.0, 1.0, period=2.0, cycles=2.5)
-    wave = program.segments[-1]
     assert program.duration == 6.0
-    assert [wave.value(t, 3.0) for t in (0, 0.5, 1.0, 1.5)] == pytest.approx([3, 4, 3, 2])
+    assert [program.prescribed(2, 1 + t, 3.0) for t in (0, 0.5, 1.0, 1.5)] == pytest.approx([3, 4, 3, 2])
     assert program.largest_load == 4.0
 
 

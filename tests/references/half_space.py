@@ -197,7 +197,7 @@ def reduced_contact(indenter, material, program, times, steps=60, elements=600):
     instants, rows = [0.0], []
     forces = np.zeros((1 + steps * (len(program.segments) + len(times)), elements))
     approach = force = work = 0.0
-    for segment, start in zip(program.segments, program.corners, strict=False):
+    for number, (segment, start) in enumerate(zip(program.segments, program.corners, strict=False)):
         begin, end = (force if segment.control == "load" else approach), start + segment.duration
         stops = [start, *(t for t in times if start < t < end), end]
         for low, high in pairwise(stops):
@@ -207,7 +207,7 @@ def reduced_contact(indenter, material, program, times, steps=60, elements=600):
                 creeps = -np.diff(material.contact_integral(now - np.array(instants))) / np.diff(instants)
                 weights = np.append(0.0, creeps[:-1]) - creeps
                 surface = indenter.reduced(x) + weights @ forces[:count]
-                value = float(segment.value(now - start, begin))
+                value = float(program.prescribed(number, now, begin))
 
                 def carried(level, surface=surface, compliance=creeps[-1]):
                     return 2 / compliance * np.trapezoid(np.maximum(level - surface, 0), x)
