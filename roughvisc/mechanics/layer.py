@@ -247,7 +247,7 @@ class LayerSeries:
         weights = np.asarray(weights, dtype=float)
         scale = crept(self.times, self.duration) @ self.compliances
         if not weights[:-1].any():  # the instantaneous compliance may be far below the final one, or vanish
-            scale = np.maximum(self.compliances[-1], 1e-6 * scale)
+            scale = np.maximum(self.compliances[-1], 1e-6 * (scale if self.times else scale.max()))
         scale = scale if scale.any() else np.ones_like(scale)
         return LayerKernel(tuple(self.q), tuple(weights @ self.compliances), tuple(scale))
 
@@ -337,7 +337,7 @@ def _known_waves(body: LayeredBody, t: Array, tolerance: float) -> tuple[Array, 
         q = lattice(longest, _SHORT / thinnest, per_decade)
         between = np.asarray(np.sqrt(q[1:] * q[:-1]), dtype=np.float64)
         expected = known(between)
-        scale = np.maximum(np.abs(expected), 1e-300)
+        scale = np.maximum(np.abs(expected), 1e-12 * expected.max(axis=1, keepdims=True) + 1e-300)
         scale[0] = scale[:2].max(axis=0)  # next to zero: of long waves on a rigid base
         error = float((np.abs(interpolated(between, q, known(q)) - expected) / scale).max())
         if error <= _INTERPOLATED * tolerance:
@@ -410,10 +410,8 @@ class LayeredBody(Body):
     def at_once(self, q: Array) -> Array:
         """Return the instantaneous effective contact compliance of waves. [1/Pa]"""
         shear = [one.glassy for one in self.materials]
-        if shear[0] == 0:
-            return 0 * q
-        almost_rigid = 1e-100 * max(shear)
-        return effective_compliance(q, self.thicknesses, self.poissons, [max(one, almost_rigid) for one in shear])
+        count = shear.index(0) if 0 in shear else len(self.thicknesses)  # nothing below a rigid material moves
+        return effective_compliance(q, self.thicknesses[:count], self.poissons[: count + 1], shear[: count + 1])
 
     def creep(self, q: Array, t: Array) -> Array:
         """Return the effective contact compliance of waves after some times, shape ``(waves, times)``. [1/Pa]
