@@ -231,6 +231,7 @@ class SlidingRows(Rows):
         """Return the variables of a steady state, and its fields in the frame of the surface."""
         force, nominal, quarters = self._force, self.profile.area, _QUARTERS[self._curve.direction]
         status = "full_contact" if (pressure > 0).all() else "converged"
+        across = (found.pressure * sliding.slope(found.pressure, axis=1)).sum()
         row = {
             "force": force,
             "nominal_pressure": force / nominal,
@@ -241,7 +242,7 @@ class SlidingRows(Rows):
             "mean_gap": float(gap.mean()),
             "friction_coefficient": found.power_force / force,
             "friction_force": found.power_force,
-            "friction_force_across": sliding.force(found.pressure, axis=1),
+            "friction_force_across": -float(across) * sliding.cell_area,
             "stated_error": max(found.residual, found.friction_residual),
             "residual": found.residual,
             "convolutions": sliding.convolutions,

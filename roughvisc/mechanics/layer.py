@@ -242,9 +242,8 @@ class LayerSeries:
     duration: float
     error: float
 
-    def kernel(self, weights: ArrayLike) -> LayerKernel:
+    def kernel(self, weights: Array) -> LayerKernel:
         """Return the kernel of the weighted sum of the terms, of which the instantaneous compliance is the last."""
-        weights = np.asarray(weights, dtype=float)
         scale = crept(self.times, self.duration) @ self.compliances
         if not weights[:-1].any():  # the instantaneous compliance may be far below the final one, or vanish
             scale = np.maximum(self.compliances[-1], 1e-6 * (scale if self.times else scale.max()))
@@ -330,8 +329,7 @@ def _known_waves(body: LayeredBody, t: Array, tolerance: float) -> tuple[Array, 
 
     decades = 10.0 ** -np.arange(1, _DECADES + 1) / whole
     alone = body.materials[-1].contact_compliance(np.append(0.0, few))
-    off = (np.abs(known(decades).T - alone) / np.maximum(alone, 1e-300)).max(axis=1)
-    is_near = off <= _INTERPOLATED * 0.1 * tolerance
+    is_near = (np.abs(known(decades).T - alone) <= 0.1 * _INTERPOLATED * tolerance * alone).all(axis=1)
     longest = decades[np.argmax(np.append(is_near[:-1], True))]
     for per_decade in _WAVES_PER_DECADE:
         q = lattice(longest, _SHORT / thinnest, per_decade)
@@ -510,4 +508,4 @@ def layer(material: Material, thickness: Quantity, *, on: Any) -> Body:
     shear = [float(one.contact_compliance(age)) * 2 / (1 - one.poisson) for one in body.materials]
     unit = 0.5 * (1 - material.poisson) * shear[0]
     elastic = body.of(Prony(one / unit, poisson=nu) for one, nu in zip(shear, body.poissons, strict=True))
-    return replace(body, kernel=layer_series(elastic, 0.0, 0.0, 1e-6).kernel([1.0]))
+    return replace(body, kernel=layer_series(elastic, 0.0, 0.0, 1e-6).kernel(np.ones(1)))

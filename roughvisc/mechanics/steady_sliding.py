@@ -158,26 +158,14 @@ class Sliding:
         found = self._convolved((displacement / most).astype(np.float32), symbol)
         return found.astype(float) * (most * unit)
 
-    def force(self, pressure: Array, axis: int = 0) -> float:
-        r"""Return the force on the profile along an axis, :math:`-\int p\, \partial u\, \mathrm dA`. [N]
-
-        Along x it drives the profile: the friction force. Along y it keeps the profile on its path.
-
-        Parameters
-        ----------
-        pressure : array, shape (nx, ny)
-            Pressure of a steady state. [Pa]
-        axis : int
-            0 for x, 1 for y.
-        """
-        return -float((pressure * self.slope(pressure, axis)).sum()) * self.cell_area
-
     def slope(self, pressure: Array, axis: int = 0) -> Array:
-        """Return the slope of the displacement out of phase with the pressure.
+        r"""Return the slope along x or y of the displacement out of phase with the pressure.
 
-        In contact the surface of the body has the slope of the profile. The displacement in phase does not contribute
-        to a force: its kernel is even, so that the sum of the pressure times its slope is zero. The other part is a
-        symmetric operator, and insensitive to the steepness of the pressure at the edges of contact.
+        In contact the surface of the body has the slope of the profile: the force on the profile is :math:`-\int p\,
+        \partial u\, \mathrm dA`. Along x it drives the profile, along y it keeps the profile on its path. The
+        displacement in phase does not contribute: its kernel is even, so that the sum of the pressure times its slope
+        is zero. The other part is a symmetric operator, and insensitive to the steepness of the pressure at the edges
+        of contact.
         """
         return self._convolved(pressure, self._skew * self._derivatives[axis])
 
@@ -264,7 +252,7 @@ def steady_state(
         added, approach_added, _ = system.solve(right, enough)
         step += added
         widening += right - diagonal * added
-        length = min(1.0, _INSIDE * min(_longest(pressure, step), _longest(separation, widening)))
+        length = _INSIDE * min(_longest(pressure, step), _longest(separation, widening))
         pressure += length * step
         pressure *= total / float(pressure.sum())
         separation += length * widening
