@@ -232,7 +232,8 @@ def steady_state(
             if not math.isfinite(float(step.sum())):  # the tolerance is below rounding
                 raise ConvergenceError(unsolved(iteration, max(errors), tolerance))
             correction, slope = pressure + step - found, sliding.slope(found)
-            force, change = (-float((part * slope).sum()) * sliding.cell_area for part in (found, 2 * correction))
+            force = -float((found * slope).sum()) * sliding.cell_area
+            change = -2 * float((correction * slope).sum()) * sliding.cell_area
             of_force = _CAUTION * abs(change) / abs(force + change) if change else 0.0
             errors = _CAUTION * float(abs(correction).sum() / found.sum()), of_force
             if max(errors) > tolerance:
