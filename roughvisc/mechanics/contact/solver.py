@@ -280,9 +280,14 @@ def solve_contact(
         previous = (cells, change, response, curvature) if curvature > 0 else None
         length *= min(max(minimum, SHRINK), GROW_AFTER_CUT if was_cut else GROW)
 
-    if under_load:
+    if under_load:  # the approach is the separation in the contact, weighted by the pressure
         full = math.inf if grid.definite or present is not None else float(given.mean())
-        level = level_under_load(grid, pressure, separation.reshape(gap.shape), full, level)
+        cells = xp.flatnonzero(pressure)
+        weight = pressure[cells]
+        if full - level < NEARLY_FULL * full:
+            weight = punch_pressure(grid, separation.reshape(gap.shape), cells, level)
+        whole = float(weight.sum())
+        level = min(level + inner(weight, separation[cells] - level) / whole, full) if whole > 0 else full
     separation -= given
     separation *= unit
     pressure *= unit
@@ -369,25 +374,16 @@ def load_error(
     return inner(opening, pressure) * off / separation.size / total
 
 
-def level_under_load(grid: Grid, pressure: Array, separation: Array, full: float, level: float) -> float:
-    """Return the approach under a load: the separation in the contact, weighted by the pressure.
+def punch_pressure(grid: Grid, separation: Array, contact: Array, level: float) -> Array:
+    """Return about the pressure ``q`` of a flat punch at the cells of a contact; zero if no cell is open.
 
     Near full contact with periodic boundaries the mean gap must be accurate, and it is far smaller than the
-    displacements. The weight is then about the pressure ``q`` of a flat punch of the same outline. An error ``e`` of
-    the pressure changes the approach by ``q.Ke``, which vanishes because ``Kq`` is uniform. ``full`` is the approach
-    of full contact.
+    displacements. With ``q`` as the weight of the separation, an error ``e`` of the pressure changes the approach by
+    ``q.Ke``, which vanishes because ``Kq`` is uniform.
     """
-    contact = grid.xp.flatnonzero(pressure)
-    weight = pressure[contact]
-    if full - level < NEARLY_FULL * full:
-        opening, opens = opening_pressure(grid, separation, contact, level, None)
-        if not opening.any():
-            return full
-        flat = opens.reshape(-1)
-        outside = (float(flat.sum()) - float(flat[contact].sum())) / (flat.size - contact.size)
-        weight = grid.xp.maximum(outside - flat[contact], 0)
-    excess = separation.reshape(-1)[contact] - level
-    return min(level + inner(weight, excess) / float(weight.sum()), full)
+    flat = opening_pressure(grid, separation, contact, level, None)[1].reshape(-1)
+    outside = (float(flat.sum()) - float(flat[contact].sum())) / max(flat.size - contact.size, 1)
+    return grid.xp.maximum(outside - flat[contact], 0)
 
 
 # ------------------------------------------------------------------------------------------------------ contact area
@@ -438,6 +434,8 @@ def contact_area(
         See :func:`neighbours`.
     """
     counted = int(np.count_nonzero(contact)) * cell_area
-    faces = sum(int(np.count_nonzero(contact & beside)) for beside in neighbours(free, boundary, outside))
+    faces = 0
+    for beside in neighbours(free, boundary, outside):
+        faces += int(np.count_nonzero(contact & beside))
     # a face across x is dy long and lies in a strip dx wide, and the other way round
     return counted, max(counted - PERIMETER_CORRECTION * cell_area * faces, 0.0), faces
