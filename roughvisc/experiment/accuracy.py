@@ -107,7 +107,7 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
     """
     point, state, apart = step.point, step.state, step.difference
     control = scene.program.segments[step.segment].control
-    given, remembers = scene.program.gives(step.segment), not scene.memory.is_elastic
+    given, remembers = scene.program.states[step.segment], not scene.memory.is_elastic
     largest_force, largest_approach = largest
     loaded, reached = max(state.largest_force, point.force), max(state.largest_approach, abs(point.approach))
     of_force = series_error * loaded

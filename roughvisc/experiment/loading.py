@@ -23,7 +23,7 @@ from roughvisc.mechanics.contact.solver import contact_area
 from roughvisc.mechanics.grid import Grid, arrays_of, to_host
 from roughvisc.mechanics.memory import Choice, History
 from roughvisc.mechanics.program import Program
-from roughvisc.mechanics.stepping import Difference, Point, Scene, State, Step, march
+from roughvisc.mechanics.stepping import SOFT, Difference, Point, Scene, State, Step, march
 from roughvisc.mechanics.tangential import tangential_force
 from roughvisc.settings import Problem, Settings, kept_times
 from roughvisc.topography.recipes import grown
@@ -217,7 +217,7 @@ class LoadingRows(Rows):
             # not to its end. A prescribed load is correct even then.
             by_load = scene.program.segments[step.segment].control == "load"
             length = max(point.time - (point.before[0] if point.before else scene.program.corners[step.segment]), 0.0)
-            if kept or (not every and (by_load or not scene.is_soft(length))):
+            if kept or (not every and (by_load or not scene.memory.grows(length, SOFT))):
                 values, fields = self._row(step, length, stated, kept)
             yield Row(point.time, values, fields, kept, self.state if step.is_end else None, point.time)
 
@@ -267,7 +267,7 @@ class LoadingRows(Rows):
         is_full = is_whole and not bool(free.any())
         status = "open" if point.force == 0 else "full_contact" if is_full else "converged"
         if is_whole:
-            mean_gap = float((gap if present is None else gap[present]).mean())
+            mean_gap = float(gap[scene.solid].mean())
         else:
             effective = to_host(displaced[-1])
             mean_gap = profile.mean_gap + float((effective * domain.mean_influence).sum()) - point.approach

@@ -274,7 +274,7 @@ def estimated(profile: Profile, compliance: float, program: Program) -> Estimate
     for number, segment in enumerate(program.segments):
         if segment.control == "approach":
             approach = max(approach, segment.end + abs(segment.amplitude) if segment.end else 0.0)
-        elif not program.gives(number):
+        elif not program.states[number]:
             return Estimate()
     pushes = [{"approach": approach}] if approach > least else []
     if program.largest_load * compliance > 0:

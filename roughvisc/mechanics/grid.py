@@ -158,6 +158,8 @@ class Grid:
         self._transforms, self._block_transforms = transforms(self.size, xp), transforms(xp=xp)
         #: Work array of all convolutions: new memory takes up to a third of the processor time at 2,048 squared.
         self._work: Array | None = None
+        #: Symbol of the inverse, made at its first use.
+        self._inverse: Array | None = None
         #: Whether a convolution calls cuFFT, which has no plans if a side is one cell, and does not normalise.
         self._by_cufft = boundary == "periodic" and hasattr(xp, "RawKernel") and 1 not in shape
         self._acting = self.symbol / self.size if self._by_cufft else self.symbol
@@ -219,15 +221,13 @@ class Grid:
         displacement : array of float32, shape (nx, ny)
             Displacement, scaled to about one, because single precision underflows. [m]
         """
-        return self._convolved(displacement, self._inverse_symbol, self.shape)
-
-    @cached_property
-    def _inverse_symbol(self) -> Array:
-        symbol = self.symbol.copy()
-        if self.boundary == "free":
-            symbol = self.xp.asarray(periodic_symbol(self.kernel, self.shape, self.spacing))
-        symbol[0, 0] = float(symbol[0, 0]) or float(symbol.max()) or self.spacing[0]
-        return (1 / symbol / (self.size if self._by_cufft else 1)).astype(np.float32)
+        if self._inverse is None:
+            symbol = self.symbol.copy()
+            if self.boundary == "free":
+                symbol = self.xp.asarray(periodic_symbol(self.kernel, self.shape, self.spacing))
+            symbol[0, 0] = float(symbol[0, 0]) or float(symbol.max()) or self.spacing[0]
+            self._inverse = (1 / symbol / (self.size if self._by_cufft else 1)).astype(np.float32)
+        return self._convolved(displacement, self._inverse, self.shape)
 
     def _convolved(self, field: Array, symbol: Array, points: tuple[int, int]) -> Array:
         """Return the convolution of a field with a symbol on a number of points."""

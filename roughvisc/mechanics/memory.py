@@ -143,22 +143,22 @@ class Memory:
             self.rates = np.maximum(rates, 0.0)
             self.parts = (root @ basis) * (basis.T @ (np.sqrt(weights / driven) * equal))
         self.fields = 2 if keeps_pressure else 1
-        self.may_ring = self.is_stiff(duration)
+        self.may_ring = self.grows(duration, STIFF)
 
-    def is_stiff(self, step: float) -> bool:
-        """Return whether the body creeps too far within a step for a linear ``v``."""
-        return step > 0 and self.compliance(step) > STIFF * self.glassy
+    def grows(self, step: float, factor: float) -> bool:
+        """Return whether the compliance grows by more than a factor within a step. [s]"""
+        return self.compliance(step) > factor * self.glassy
 
     def start(self, nothing: Array) -> History:
         """Return the memory of a body at rest, from an array of zeros, shape (nx, ny)."""
-        fields = self.kept(nothing, nothing)
-        return History(fields, namespace(fields).zeros((self.times.size, *fields.shape), fields.dtype))
+        xp, shape = namespace(nothing), (self.fields, *nothing.shape)
+        return History(xp.zeros(shape, nothing.dtype), xp.zeros((self.times.size, *shape), nothing.dtype))
 
     def predict(self, history: History, step: float, rule: Rule | None = None) -> Prediction:
         """Return the elastic problem of a step. [s]"""
         if rule is None:
             follows = history.earlier is not None and step <= LARGEST_GROWTH * history.step
-            rings = self.may_ring and self.is_stiff(step)
+            rings = self.may_ring and self.grows(step, STIFF)
             rule = ("bdf2" if follows else "constant") if rings else "linear"
         own, earlier, before, new = self.recursion(step, history.step, rule)
         xp = namespace(history.modes)
@@ -185,11 +185,11 @@ class Memory:
         pressure : array, shape (nx, ny)
             Pressure at the end. [Pa]
         """
-        fields = self.kept(unit, pressure)
+        fields = unit[None] if self.fields == 1 else namespace(unit).stack([unit, pressure])
         for mode, weight in zip(prediction.modes, prediction.new, strict=True):
             mode += weight * fields
         # the next step can use BDF2 only if it is stiff and not much longer than this one
-        needed = self.may_ring and self.is_stiff(LARGEST_GROWTH * prediction.step)
+        needed = self.may_ring and self.grows(LARGEST_GROWTH * prediction.step, STIFF)
         return History(fields, prediction.modes, history.modes if needed else None, prediction.step)
 
     def displacement(self, history: History, left: Any = 1.0) -> Array:
@@ -211,25 +211,11 @@ class Memory:
         for weight, part, mode in zip(self.weights[:-1], parts, history.modes, strict=True):
             if part:
                 total += weight * (mode if part == 1 else part * mode)
-        return self.on_cells(total)
+        return total
 
     def after_rest(self, history: History, time: float) -> Array:
         """Return the displacement after a time without pressure; the present pressure must be zero. [m]"""
         return self.displacement(history, self.recursion(time, 0.0, "linear")[0])[0]
-
-    # The methods below depend on the kept fields, which are transforms if the waves of a body creep differently.
-
-    def kept(self, unit: Array, pressure: Array) -> Array:
-        """Return the fields of a history. [m Pa], [Pa]"""
-        return unit[None] if self.fields == 1 else namespace(unit).stack([unit, pressure])
-
-    def on_cells(self, total: Array) -> Array:
-        """Return the displacement on the cells. [m]"""
-        return total
-
-    def unit(self, history: History) -> Array | None:
-        """Return the displacement per unit compliance; None if the body has no common kernel. [m Pa]"""
-        return history.fields[0]
 
     def roll(self, history: History, cells: int, axis: int) -> History:
         """Return the memory of a periodic body, in the frame of a profile that has moved along an axis."""
@@ -312,13 +298,9 @@ class LayerMemory(Memory):
             alone = np.eye(len(waves.compliances))
             self.weights = [grid.xp.asarray(grid.symbol_of(waves.kernel(one), is_whole=False)) for one in alone]
 
-    def kept(self, unit: Array, pressure: Array) -> Array:
-        """Return the transform of the pressure."""
-        return self.grid.spectrum(pressure)[None]
-
-    def on_cells(self, total: Array) -> Array:
-        """Return the displacement, shape (1, nx, ny). [m]"""
-        return self.grid.field_of(total[0])[None]
+    def start(self, nothing: Array) -> History:
+        """Return the memory of a body at rest, from an array of zeros, shape (nx, ny)."""
+        return super().start(self.grid.spectrum(nothing))
 
     def predict(self, history: History, step: float, rule: Rule | None = None) -> Prediction:
         """Return the elastic problem of a step [s], with its kernel; its compliance is one, or zero if it is rigid."""
@@ -328,9 +310,13 @@ class LayerMemory(Memory):
         grid = Grid(cells.shape, cells.spacing, cells.boundary, kernel=kernel, symbol=symbol, xp=cells.xp)
         return replace(found, compliance=float(symbol.any()), carried=cells.field_of(found.carried), grid=grid)
 
-    def unit(self, history: History) -> None:
-        """Return None: the kernel differs between steps."""
-        return
+    def advance(self, history: History, prediction: Prediction, unit: Array, pressure: Array) -> History:
+        """Return the memory after a step, from the pressure at its end."""
+        return super().advance(history, prediction, self.grid.spectrum(pressure), pressure)
+
+    def displacement(self, history: History, left: Any = 1.0) -> Array:
+        """Return the displacement, shape (1, nx, ny). [m]"""
+        return self.grid.field_of(super().displacement(history, left)[0])[None]
 
     def rolled(self, fields: Array, cells: int, axis: int) -> Array:
         """Return transforms in the frame of a profile that has moved along an axis."""

@@ -474,19 +474,15 @@ class Program:
             return end
         return start + (end - start) * (elapsed / segment.duration)
 
-    def gives(self, number: int) -> bool:
-        """Return whether the program states the value of a segment; a hold may keep a computed value instead.
-
-        Parameters
-        ----------
-        number : int
-            Index of the segment.
-        """
-        control = self.segments[number].control
-        for segment in reversed(self.segments[: number + 1]):
-            if segment.control != control or segment.end is not None:
-                return segment.control == control
-        return True
+    @cached_property
+    def states(self) -> list[bool]:
+        """Whether the program states the value of each segment; a hold may keep a computed value instead."""
+        found, control = list[bool](), self.segments[0].control if self.segments else "load"
+        for segment in self.segments:
+            is_stated = segment.end is not None or (segment.control == control and (not found or found[-1]))
+            control = segment.control
+            found.append(is_stated)
+        return found
 
     @cached_property
     def duration(self) -> float:

@@ -26,13 +26,13 @@ import numpy as np
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.mechanics.contact import solve_contact
 from roughvisc.mechanics.grid import Grid
-from roughvisc.mechanics.memory import History, Memory, Rule
+from roughvisc.mechanics.memory import STIFF, History, Memory, Rule
 from roughvisc.mechanics.program import Program, Segment, Slide, instant
 from roughvisc.mechanics.tangential import tangential_force
 
 Array = Any  # an array of NumPy or CuPy
-#: Pressure [Pa], and its displacement per unit compliance if known [m Pa].
-Guess = tuple[Array, Array | None]
+#: Pressure [Pa], and its displacement per unit compliance, which is not used if the kernel depends on the step. [m Pa]
+Guess = tuple[Array, Array]
 
 #: Length of the first pair after an event, as a part of the segment: contact changes fast after a corner.
 FIRST_PAIR = 0.005
@@ -79,8 +79,8 @@ SHORTEST_HALF, LONGEST_HALF, MOST_UNEQUAL = 0.15, 0.6, 2.0
 PAIRS_OF_A_CYCLE = 8
 #: Force and approach are parabolas over a pair only if each of its steps covers at least this part of it.
 LEAST_PART = 0.1
-#: A pair of steps is soft if less than this part of its compliance is instantaneous.
-SOFT = 0.1
+#: A pair of steps is soft if its compliance grows by more than this factor.
+SOFT = 10.0
 #: Length of the additional step that gives the pressure at the end of a soft step, as a part of the soft step.
 END_STEP = 1e-3
 #: Part of the usual tolerance of the contact solver in a soft step that ends at a kept time: the additional step
@@ -128,6 +128,8 @@ class Scene:
         Fixed step; None: the tolerance controls the steps. [s]
     present : array of bool or None
         Cells with material; None: all.
+    solid : array of bool or ellipsis
+        Index of the cells with material.
     can_jump : bool
         Whether the body has an instantaneous compliance.
     stated : tuple of float
@@ -146,14 +148,16 @@ class Scene:
     tolerance: float = 1e-3
     time_step: float | None = None
     present: Array | None = None
+    solid: Any = field(init=False)
     can_jump: bool = field(init=False)
     stated: tuple[float, float] = field(init=False)
     share: float = field(init=False)
     motions: list[Slide | None] = field(init=False)
 
     def __post_init__(self) -> None:
+        self.solid = ... if self.present is None else self.present
         self.can_jump = self.memory.compliance(0.0) > 0
-        is_soft = self.is_soft(self.program.duration)
+        is_soft = self.memory.grows(self.program.duration, SOFT)
         self.stated, self.share = (STATED_SOFT, SHARE_SOFT) if is_soft else (STATED, SHARE)
         motion, self.motions = None, []
         for segment in reversed(self.program.segments):
@@ -161,14 +165,6 @@ class Scene:
         for segment in self.program.segments:
             motion = segment.slide or motion
             self.motions.append(motion)
-
-    def lowest(self, values: Array) -> float:
-        """Return the least value over the present cells."""
-        return float(values.min() if self.present is None else values[self.present].min())
-
-    def is_soft(self, step: float) -> bool:
-        """Return whether hardly any compliance of a step is instantaneous. [s]"""
-        return self.memory.compliance(0.0) < SOFT * self.memory.compliance(step)
 
     def keeps(self, time: float) -> bool:
         """Return whether a time is kept. [s]"""
@@ -210,7 +206,7 @@ class Point:
     force: float
     approach: float
     history: History
-    before: tuple[float, Array, Array] | None = None
+    before: tuple[float, Array, Array | None] | None = None
     start: float = 0.0
     is_late: bool = False
     solver_error: float = 0.0
@@ -346,7 +342,7 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
     if state is None:
         nothing = scene.grid.xp.zeros(scene.gap.shape)
         given = bool(segments) and segments[0].control == "approach"
-        approach = 0.0 if given else scene.lowest(scene.gap)
+        approach = 0.0 if given else float(scene.gap[scene.solid].min())
         state = State(Point(0.0, nothing, 0.0, approach, scene.memory.start(nothing)))
         if segments and segments[0].duration > 0:
             yield Step(state.fine, state.difference, 0, state)
@@ -413,7 +409,7 @@ def single_step(scene: Scene, state: State, time: float) -> Step:
     new = other = take_step(scene, fine, time, number, rule="linear")
     if coarse is not fine:
         rule: Rule | None = "linear" if coarse.force == 0 else None
-        other = take_step(scene, coarse, time, number, guess=moved(scene, new, coarse, fine), rule=rule)
+        other = take_step(scene, coarse, time, number, guess=moved(new, coarse, fine), rule=rule)
     shared = state.difference.shared * scene.memory.remaining(time - fine.time)
     apart = replace(error_at(scene, fine, new, other), shared=shared)
     reached, twice = new, other
@@ -465,10 +461,10 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         # The pair, the same in one step, and the pressures at these instants.
         middle, last = pair_ends(fine.time, length, event, next_event)
         taken = last - fine.time
-        is_soft, lands = scene.is_soft(taken), scene.keeps(last) or middle == event
+        is_soft, lands = memory.grows(taken, SOFT), scene.keeps(last) or middle == event
         first, half = step_of_pair(scene, fine, middle, number, is_soft)
         second, whole = step_of_pair(scene, first, last, number, is_soft)
-        once, other = step_of_pair(scene, coarse, last, number, is_soft, moved(scene, second, coarse, fine))
+        once, other = step_of_pair(scene, coarse, last, number, is_soft, moved(second, coarse, fine))
 
         # Error at the end; errors due to cells that have just entered, in the middle and shared by both solutions.
         apart = error_at(scene, fine, whole, other)
@@ -510,10 +506,10 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         elif misses and taken > shortest:
             refused, refused_end, length = ratio, at_end, taken * 0.5
         else:
-            easy = ratio < NEARLY_NOTHING and not memory.is_stiff(GROW_FAST * taken)
+            easy = ratio < NEARLY_NOTHING and not memory.grows(GROW_FAST * taken, STIFF)
             was_cut, asked = taken < 0.9 * length, length
             length = taken * min(max(factor, SHRINK), GROW_FAST if easy else GROW)
-            if was_cut and factor >= 1 and not memory.is_stiff(asked):  # an event has cut the pair
+            if was_cut and factor >= 1 and not memory.grows(asked, STIFF):  # an event has cut the pair
                 length = max(length, min(asked, factor * taken))
             break
         del first, second, once, half, whole, other  # frees their memory while the pair is repeated
@@ -557,11 +553,11 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     points, works = [fine], [0.0]
     for number in range(1, count + 1):
         here, time = points[-1], instant(began, end, taken + number, cells)
-        points.append(over(here, 1, time, (here.pressure, memory.unit(here.history))))
+        points.append(over(here, 1, time, (here.pressure, here.history.fields[0])))
         works.append(works[-1] + work_of_step(scene, here, points[-1], slides=True))
     once = last = points[-1]
     if coarse is not fine or count == 2:
-        once = over(coarse, count, last.time, moved(scene, last, coarse, fine))
+        once = over(coarse, count, last.time, moved(last, coarse, fine))
     force = friction(scene, last, slide)
     apart = error_at(scene, fine, last, once)
     apart = replace(apart, friction=abs(force - friction(scene, once, slide)))
@@ -595,7 +591,7 @@ def added(scene: Scene, state: State, second: Point, once: Point, force: float, 
     then = scene.program.prescribed(state.segment, min(following, end), second.start)
     ahead = max(then / now, 1.0) if now > 0 else 1.0
     force, approach = max(force, second.force * ahead), max(approach, abs(second.approach) * ahead**0.5)
-    soft = scene.is_soft(taken)
+    soft = memory.grows(taken, SOFT)
     receding = bool(((fine.pressure > 0) & (second.pressure == 0)).any())
 
     # Change of the difference between both solutions over the pair, from its full value before the pair or from the
@@ -674,7 +670,7 @@ def error_at(scene: Scene, before: Point, fine: Point, coarse: Point) -> Differe
     if scene.present is not None:
         outside &= scene.present
     cells, jumps = int((fine.pressure > 0).sum()), 0.0
-    if cells and scene.is_soft(fine.time - before.time):
+    if cells and scene.memory.grows(fine.time - before.time, SOFT):
         jumps = entering(scene, before, fine) + ENTERING * float(outside.sum()) * fine.force / cells
     uncertain = grid.cell_area * float(inside.sum()), grid.cell_area * float(outside.sum())
     return Difference(pressure + jumps, apart.force, approach, *uncertain)
@@ -770,7 +766,8 @@ def touch(scene: Scene, point: Point) -> float:
     """Return the approach of a point; while the surfaces are apart, the approach at which they last touch. [m]"""
     if point.force > 0:
         return point.approach
-    return max(point.approach, scene.lowest(scene.gap + scene.memory.displacement(point.history)[0]))
+    surface = scene.gap + scene.memory.displacement(point.history)[0]
+    return max(point.approach, float(surface[scene.solid].min()))
 
 
 def pair_ends(now: float, length: float, event: float, next_event: float) -> tuple[float, float]:
@@ -832,13 +829,14 @@ def take_step(
     prediction = memory.predict(here.history, step, "constant" if here.is_late else rule)
     alpha, gap, grid = prediction.compliance, prediction.carried, prediction.grid or scene.grid
     gap += scene.gap
-    lowest = scene.lowest(gap)
-    before = (here.time, here.pressure, memory.unit(here.history)) if step > 0 and not here.is_late else None
+    lowest = float(gap[scene.solid].min())
+    common = here.history.fields[0] if prediction.grid is None else None  # displacement per unit compliance
+    before = (here.time, here.pressure, common) if step > 0 and not here.is_late else None
     if value == 0 if by_load else value <= lowest:
         nothing = grid.xp.zeros(gap.shape)
         history = memory.advance(here.history, prediction, nothing, nothing)
         return Point(time, nothing, 0.0, lowest if by_load else value, history, before, here.start)
-    pressure, unit = guess or (here.pressure, memory.unit(here.history))
+    pressure, unit = guess or (here.pressure, common)
     if guess is None and here.before is not None and step > 0:
         # Extrapolate from the last two points.
         then, former, former_unit = here.before
@@ -846,7 +844,8 @@ def take_step(
         pressure = pressure + ratio * (pressure - former)
         unit = None if unit is None or pressure.min() < 0 else unit + ratio * (unit - former_unit)
     guess = None  # frees its memory while the contact is solved
-    start = {"start": alpha * pressure, "start_displacement": None if unit is None else alpha * unit}
+    known = alpha * unit if prediction.grid is None and unit is not None else None
+    start = {"start": alpha * pressure, "start_displacement": known}
     del pressure, unit
     given: dict[str, Any] = {"load": value * alpha / area} if by_load else {"approach": value}
     tolerance = max(SOLVER_SHARE * scene.tolerance * share, 1e-10)
@@ -867,11 +866,10 @@ def take_step(
     return Point(time, pressure, force, approach, history, before, here.start, False, *errors)
 
 
-def moved(scene: Scene, second: Point, coarse: Point, fine: Point) -> Guess:
+def moved(second: Point, coarse: Point, fine: Point) -> Guess:
     """Return a first guess of the coarse solution: the fine solution, with the difference before the pair."""
-    memory = scene.memory
-    unit, of_coarse, of_fine = memory.unit(second.history), memory.unit(coarse.history), memory.unit(fine.history)
-    if coarse is fine or unit is None or of_coarse is None:
+    unit, of_coarse, of_fine = (point.history.fields[0] for point in (second, coarse, fine))
+    if coarse is fine:
         return second.pressure, unit
     return second.pressure + (coarse.pressure - fine.pressure), unit + (of_coarse - of_fine)
 
@@ -881,12 +879,15 @@ def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> 
     here, now, began = state.fine, state.fine.time, scene.program.corners[state.segment]
     if segment.control == "load":
         return event if segment.highest(here.start) == 0 else now
-    if segment.highest(here.start) <= scene.lowest(scene.gap):  # the surface recovers to its undeformed shape
+    if segment.highest(here.start) <= float(
+        scene.gap[scene.solid].min()
+    ):  # the surface recovers to its undeformed shape
         return event
 
     def touching(left: float, right: float) -> float | None:
         """Return the last time between two times at which the surfaces are still apart; None if they stay apart."""
-        level = scene.lowest(scene.gap + scene.memory.after_rest(here.history, right - now))
+        surface = scene.gap + scene.memory.after_rest(here.history, right - now)
+        level = float(surface[scene.solid].min())
         ends = [scene.program.prescribed(state.segment, time, here.start) for time in (left, right)]
         if max(ends) <= level or (right - left <= shortest and ends[1] <= level):
             return None
