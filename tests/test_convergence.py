@@ -34,7 +34,7 @@ def scaled(program, load):
 def run(material, program, times):
     """States at the common times, stepping exactly onto the given times and no others."""
     load = 4 / 3 * 0.36**3 / float(material.contact_compliance(DURATION))
-    series = choose_memory(rv.Body(material), DURATION, 1e-7, 1e-6 * DURATION).memory.series
+    series = choose_memory(rv.Body(material), DURATION, 1e-7, 1e-6 * DURATION).series
     given = {"shape": (13, 11), "size": 1.0, "tolerance": 1e-9, "time_step": 1e9}
     settings = scene(series, scaled(program, load), times=tuple(times), **given)
     steps = [s for s in march(settings) if np.isclose(s.point.time, COMMON, rtol=0, atol=1e-9).any()]

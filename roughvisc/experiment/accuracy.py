@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.solver import PERIMETER_CORRECTION
-from roughvisc.mechanics.memory import SERIES_SHARE, Choice, choose_memory
+from roughvisc.mechanics.memory import SERIES_SHARE, Memory, choose_memory
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import SHORTEST_PAIR, Scene, Step
 from roughvisc.settings import Settings, kept_times
@@ -44,7 +44,7 @@ _FREE = 0.25
 LARGEST_SLOPE = 0.3
 
 
-def memory_of(body: Body, program: Program, settings: Settings, **options: Any) -> Choice:
+def memory_of(body: Body, program: Program, settings: Settings, **options: Any) -> Memory:
     """Return the memory of a body for the kept rows of a program.
 
     Parameters

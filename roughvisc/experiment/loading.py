@@ -21,7 +21,7 @@ from roughvisc.experiment.resources import WORTH_ASKING, require_loading
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.solver import contact_area
 from roughvisc.mechanics.grid import Grid, arrays_of, to_host
-from roughvisc.mechanics.memory import Choice, History
+from roughvisc.mechanics.memory import History
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import SOFT, Difference, Point, Scene, State, Step, march
 from roughvisc.mechanics.tangential import tangential_force
@@ -102,12 +102,12 @@ class Loading(Experiment):
         profile, domain, enlarged, reaches_border = choose_surface(given, problem, program, *before)
         gap = np.ascontiguousarray(profile.gap[domain.cells])
         grid = Grid((gap.shape[0], gap.shape[1]), profile.spacing, settings.boundary, kernel=profile.kernel, xp=xp)
-        choice = memory_of(body, program, settings, grid=grid, keeps_pressure=not domain.is_whole)
-        log.info("memory: %s", choice.note)
+        memory = memory_of(body, program, settings, grid=grid, keeps_pressure=not domain.is_whole)
+        log.info("memory: %s", memory.note)
         scene = Scene(
             grid=grid,
             gap=xp.asarray(gap),
-            memory=choice.memory,
+            memory=memory,
             program=program,
             kept=kept_times(program, settings.times, profile.spacing),
             tolerance=settings.tolerance,
@@ -118,7 +118,6 @@ class Loading(Experiment):
             problem=replace(problem, height=profile.height),
             end=program.duration,
             scene=scene,
-            choice=choice,
             profile=profile,
             domain=domain,
             area=given.area,
@@ -157,8 +156,6 @@ class LoadingRows(Rows):
         Duration of the program. [s]
     scene : Scene
         Input of the time stepping: grid, gap, memory, program, kept times.
-    choice : Choice
-        Memory of the body, and its distance from the material.
     profile : Profile
         Arrays of the surface.
     domain : Domain
@@ -174,7 +171,6 @@ class LoadingRows(Rows):
     problem: Problem
     end: float
     scene: Scene
-    choice: Choice
     profile: Profile
     domain: Domain
     area: float
@@ -204,7 +200,7 @@ class LoadingRows(Rows):
                     self._reach_border(point.time)
 
             so_far = max(largest[0], point.force), max(largest[1], abs(point.approach))
-            stated = error_columns(step, scene, self.choice.series_error, so_far)
+            stated = error_columns(step, scene, scene.memory.series_error, so_far)
             kept = scene.keeps(point.time)
             if every:  # the length of fixed steps and of steps in a slide cannot be reduced
                 is_given = scene.time_step is not None or scene.program.segments[step.segment].slide is not None
@@ -315,7 +311,7 @@ class LoadingRows(Rows):
 
     def finish(self, dataset: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
         """Return the result with the memory model and the cycles, and its warnings."""
-        scene, profile, choice, limit, warnings = self.scene, self.profile, self.choice, self.scene.tolerance, {}
+        scene, profile, memory, limit, warnings = self.scene, self.profile, self.scene.memory, self.scene.tolerance, {}
         boundary, program, errors = scene.grid.boundary, scene.program, dataset["stated_error"].values
         missed = errors[errors > limit]
         if missed.size:
@@ -337,13 +333,13 @@ class LoadingRows(Rows):
         if program.slides:
             pressure = dataset["pressure"][-1].values if "pressure" in dataset else None
             warnings["wake"] = wakes_of(scene, profile, pressure)
-        off = max(choice.series_error, choice.misfit)
+        off = max(memory.series_error, memory.misfit)
         if off > limit:
             warnings["series"] = (
                 f"The series in place of the material is {100 * off:.2g} % off at worst, more than the tolerance "
                 f"{limit:g} (memory): no passive material comes nearer to it."
             )
-        attributes: dict[str, Any] = {"memory": choice.note, "series_error": choice.series_error}
+        attributes: dict[str, Any] = {"memory": memory.note, "series_error": memory.series_error}
         if cycles := program.cycles:  # for the work in each cycle
             attributes["cycles"] = json.dumps(cycles)
         return dataset.assign_attrs(attributes), warnings

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.mechanics.body import HALF_SPACE, Kernel
-from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.contact.solver import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.program import Program
 from roughvisc.settings import Missing, Problem, Settings

@@ -125,7 +125,7 @@ def march_bytes(
     # a smaller domain also keeps the pressure that causes the displacement
     kept = _SPECTRUM[settings.boundary] if layered else 1.0 if part == 1 else 2.0
     crept = memory.glassy + float(memory.compliances[np.isfinite(memory.times)].sum())
-    solutions, copies = _ELASTIC if memory.is_elastic else _SOFT_PAIR if memory.glassy <= SOFT * crept else _PAIR
+    solutions, copies = _ELASTIC if memory.is_elastic else _SOFT_PAIR if crept >= SOFT * memory.glassy else _PAIR
     solved = _SOLVE + _TRANSFORMS[settings.boundary] + _IN_CONTACT * contact
     solved += solutions * (1 + kept) + copies * kept * exponentials
     if layered:
@@ -151,7 +151,7 @@ def require_loading(shape: tuple[int, int], program: Program, settings: Settings
     TooLargeError
         If it does not fit. The message gives the needed and the available memory, and a grid that fits.
     """
-    memory = memory_of(body, program, settings).memory
+    memory = memory_of(body, program, settings)
     times = program.segments if settings.times is None else settings.times  # one row for each segment, or more
     rows = times if isinstance(times, int) else len(times)
     rows = rows if in_memory and settings.device == "cpu" else 0  # kept fields are on the host

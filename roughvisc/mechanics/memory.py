@@ -114,6 +114,15 @@ class Memory:
         Length of the program: no step is longer. [s]
     keeps_pressure : bool
         Whether the pressure that causes the displacement is kept too.
+
+    Attributes
+    ----------
+    series_error : float
+        Largest relative error of the compliance at time zero and from the shortest age on; zero if the memory is exact.
+    misfit : float
+        Largest relative deviation of the series from the rows of a table, zero if it is within their noise.
+    note : str
+        The model in words.
     """
 
     def __init__(self, series: Prony, duration: float, keeps_pressure: bool = False) -> None:
@@ -143,6 +152,9 @@ class Memory:
             self.rates = np.maximum(rates, 0.0)
             self.parts = (root @ basis) * (basis.T @ (np.sqrt(weights / driven) * equal))
         self.fields = 2 if keeps_pressure else 1
+        self.series_error, self.misfit, count = 0.0, 0.0, len(series.times)
+        terms = [f"{count} exponential{'s' * (count > 1)}"] * (count > 0) + ["a fluidity"] * (series.fluidity > 0)
+        self.note = " and ".join(terms) or "no memory: elastic"
         self.may_ring = self.grows(duration, STIFF)
 
     def grows(self, step: float, factor: float) -> bool:
@@ -323,31 +335,9 @@ class LayerMemory(Memory):
         return fields * self.grid.turn(cells, axis)
 
 
-@dataclass(frozen=True)
-class Choice:
-    """A memory, and its deviation from the material.
-
-    Attributes
-    ----------
-    memory : Memory
-        Memory of the time steps.
-    series_error : float
-        Largest relative error of the compliance at time zero and from the shortest age on; zero if the memory is exact.
-    note : str
-        The model in words.
-    misfit : float
-        Largest relative deviation of the series from the rows of a table, zero if it is within their noise.
-    """
-
-    memory: Memory
-    series_error: float
-    note: str
-    misfit: float = 0.0
-
-
 def choose_memory(
     body: Body, duration: float, tolerance: float, shortest: float, grid: Any = None, keeps_pressure: bool = False
-) -> Choice:
+) -> Memory:
     """Return the memory of a body for a program.
 
     Parameters
@@ -367,7 +357,7 @@ def choose_memory(
 
     Returns
     -------
-    Choice
+    Memory
         A series within a tenth of the tolerance if the material is passive.
 
     Raises
@@ -379,25 +369,28 @@ def choose_memory(
     if isinstance(body, LayeredBody) and not body.separates:
         return _of_layers(body, duration, share, shortest, grid)
     found, error = _series(body.material, shortest, duration, share)
-    within = f" in place of the compliance, within {error:.1e} of it at time zero and from {shortest:.1g} s"
-    active = "no positive series comes nearer: the material is not passive" if error > tolerance else ""
-    notes = in_words(found) + within * bool(error), body.material.note, active
     memory = Memory(found, duration, keeps_pressure)
-    return Choice(memory, error, "; ".join(filter(None, notes)), body.material.misfit * (duration > 0))
+    memory.series_error, memory.misfit = error, body.material.misfit * (duration > 0)
+    if error:
+        memory.note += f" in place of the compliance, within {error:.1e} of it at time zero and from {shortest:.1g} s"
+    active = "no positive series comes nearer: the material is not passive" if error > tolerance else ""
+    memory.note = "; ".join(filter(None, (memory.note, body.material.note, active)))
+    return memory
 
 
-def _of_layers(body: LayeredBody, duration: float, share: float, shortest: float, grid: Any) -> Choice:
+def _of_layers(body: LayeredBody, duration: float, share: float, shortest: float, grid: Any) -> Memory:
     """Return the memory of a layered body: exponentials that all waves share."""
     given = body.materials
     found, errors = zip(*(_series(one, shortest, duration, MATERIALS_SHARE * share) for one in given), strict=True)
     waves = layer_series(body.of(found), shortest, duration, share - max(errors))
-    memory, error = LayerMemory(waves, duration, grid), waves.error + max(errors)
+    memory = LayerMemory(waves, duration, grid)
+    memory.series_error, memory.misfit = waves.error + max(errors), max(one.misfit for one in given)
     note = "the instantaneous compliance of each wave"
     if waves.times:
-        within = f"within {error:.1e} of them from {shortest:.1g} s on"
-        note = f"{in_words(memory.series)} that all waves share, each with compliances of its own, {within}"
-    notes = "; ".join(filter(None, (note, *(one.note for one in given))))
-    return Choice(memory, error, notes, max(one.misfit for one in given))
+        within = f"within {memory.series_error:.1e} of them from {shortest:.1g} s on"
+        note = f"{memory.note} that all waves share, each with compliances of its own, {within}"
+    memory.note = "; ".join(filter(None, (note, *(one.note for one in given))))
+    return memory
 
 
 def _series(material: Material, shortest: float, duration: float, tolerance: float) -> tuple[Prony, float]:
@@ -408,10 +401,3 @@ def _series(material: Material, shortest: float, duration: float, tolerance: flo
         return series(material, shortest, duration, tolerance)
     glassy = float(material.creep_compliance(0.0))
     return Prony(glassy, 0.0 if glassy else 1.0, poisson=material.poisson), 0.0
-
-
-def in_words(found: Prony) -> str:
-    """Return the terms of a series in words."""
-    count = len(found.times)
-    terms = [f"{count} exponential{'s' * (count > 1)}"] * (count > 0) + ["a fluidity"] * (found.fluidity > 0)
-    return " and ".join(terms) or "no memory: elastic"

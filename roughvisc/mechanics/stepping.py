@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from roughvisc.errors import ConvergenceError, InputError
-from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.contact.solver import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.memory import STIFF, History, Memory, Rule
 from roughvisc.mechanics.program import Program, Segment, Slide, instant
@@ -756,8 +756,6 @@ def work_of_step(scene: Scene, before: Point, after: Point, slides: bool = False
         first = float((before.pressure * memory.displacement(before.history, 0.0)[0]).sum())
         last = float((after.pressure * memory.displacement(after.history, 0.0)[0]).sum())
         return 0.5 * last * scene.grid.cell_area - 0.5 * first * scene.grid.cell_area
-    if before.force == 0 == after.force:
-        return 0.0
     force = after.force if before.is_late else before.force
     return 0.5 * (force + after.force) * (touch(scene, after) - touch(scene, before))
 
@@ -868,10 +866,11 @@ def take_step(
 
 def moved(second: Point, coarse: Point, fine: Point) -> Guess:
     """Return a first guess of the coarse solution: the fine solution, with the difference before the pair."""
-    unit, of_coarse, of_fine = (point.history.fields[0] for point in (second, coarse, fine))
+    unit = second.history.fields[0]
     if coarse is fine:
         return second.pressure, unit
-    return second.pressure + (coarse.pressure - fine.pressure), unit + (of_coarse - of_fine)
+    apart = coarse.history.fields[0] - fine.history.fields[0]
+    return second.pressure + (coarse.pressure - fine.pressure), unit + apart
 
 
 def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> float:

@@ -38,7 +38,7 @@ from roughvisc.experiment.resources import (
     too_large,
 )
 from roughvisc.experiment.sliding import SteadySliding
-from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.contact.solver import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.program import Program
 from roughvisc.settings import Problem
@@ -381,7 +381,7 @@ def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Availab
     kind, model, area, note = "curve", "steady sliding", nominal_area(whole), ""
     arrays: Callable[[float], float] = partial(curve_bytes, settings)
     if isinstance(own, LoadingRows):
-        scene, program, model, area = own.scene, own.scene.program, own.choice.note, own.area
+        scene, program, model, area = own.scene, own.scene.program, own.scene.memory.note, own.area
         kind, force, note = "slide" if program.slides else "load", max(force, program.largest_load), case.program.note
         rows = run.kept * run.steps if scene.kept is None else float(len(scene.kept))
         arrays = partial(march_bytes, settings, scene.memory, contact=float(run.contact[-1]), part=part)
