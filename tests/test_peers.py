@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support import rough_gap
 
-from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.contact.solver import solve_contact
 from roughvisc.mechanics.grid import Grid
 
 tamaas = pytest.importorskip("tamaas")

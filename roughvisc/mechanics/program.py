@@ -135,9 +135,7 @@ class Segment:
 
     def turns(self, after: float, before: float) -> list[float]:
         """Return the turning points of a cycle strictly between two times since its start. [s]"""
-        if not self.amplitude:
-            return []
-        quarter = self.period / 4
+        quarter = self.period / 4  # infinite without a cycle
         first, last = (math.floor(time / quarter) for time in (after, before))
         return [n * quarter for n in range(first, last + 1) if n % 2 and after < n * quarter < before]
 

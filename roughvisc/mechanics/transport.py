@@ -45,8 +45,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, sparse
 
-from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.contact.solver import neighbours
+from roughvisc.mechanics.contact.solver import neighbours, solve_contact
 from roughvisc.mechanics.grid import Boundary, Grid
 
 Array = NDArray[np.float64]

@@ -12,8 +12,7 @@ import xarray as xr
 
 from roughvisc.experiment.grid_error import coarser
 from roughvisc.experiment.profile import Profile
-from roughvisc.mechanics.contact import solve_contact
-from roughvisc.mechanics.contact.solver import contact_area
+from roughvisc.mechanics.contact.solver import contact_area, solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.materials.prony import zener
 from roughvisc.topography.conditioning import condition

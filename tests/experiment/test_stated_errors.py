@@ -7,7 +7,7 @@ import pytest
 
 import roughvisc as rv
 from roughvisc.mechanics import stepping
-from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.contact.solver import solve_contact
 
 BALL = rv.sphere(10e-3, 1e-3, 25)
 FLUID = rv.maxwell(3e6, 1e5)

@@ -8,7 +8,8 @@ import pytest
 from scipy import fft
 
 from roughvisc.mechanics import grid as grids
-from roughvisc.mechanics.contact import long_waves, solve_contact, solver
+from roughvisc.mechanics.contact import long_waves, solver
+from roughvisc.mechanics.contact.solver import solve_contact
 from roughvisc.mechanics.grid import Grid
 
 

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 from support import rough_gap
 
-from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.contact.solver import solve_contact
 from roughvisc.mechanics.grid import Grid
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import roughvisc as rv
-from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.contact.solver import solve_contact
 from roughvisc.mechanics.grid import Grid
 
 sys.path.append(str(Path(__file__).parents[2] / "tests"))

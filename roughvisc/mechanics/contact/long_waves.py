@@ -41,8 +41,6 @@ class LongWaves(NamedTuple):
         Area of a cell over the area of a block.
     local : float
         Local compliance. [m]
-    passes : module
-        Passes over the free cells, for arrays of NumPy or CuPy.
 
     References
     ----------
@@ -55,7 +53,6 @@ class LongWaves(NamedTuple):
     free: Array
     part: float
     local: float
-    passes: Any
 
     @classmethod
     def of(cls, grid: Grid, cells: Array, held: Array, energy: float, on_grid: Any, passes: Any) -> LongWaves | None:
@@ -74,12 +71,8 @@ class LongWaves(NamedTuple):
         smooth, spread = passes.spot_sums(loads, displaced, free)
         if not energy > smooth:
             return None
-        return cls(blocks, block, sums, free, part, LOCAL_SHARE * (energy - smooth) / spread, passes)
+        return cls(blocks, block, sums, free, part, LOCAL_SHARE * (energy - smooth) / spread)
 
     def mean(self, sums: Array) -> Array:
         """Return the mean over the free cells of each block from the sum; zero if there are none."""
         return sums / self.blocks.xp.maximum(self.free, 1)
-
-    def pressure(self, sums: Array) -> Array:
-        """Return the pressure of each block that displaces it by the mean residual, from the sum of the residual."""
-        return self.passes.block_pressure(self.blocks, sums, self.free, self.local, self.part)

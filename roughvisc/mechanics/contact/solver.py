@@ -152,9 +152,10 @@ def solve_contact(
         passes = kernels
     present = None if present is None or present.all() else present.reshape(-1)
     absent = slice(0) if present is None else ~present
-    start = start if start is not None and (start > 0).any() else None
+    if start is None or not (start > 0).any():
+        start = start_displacement = None
     if start is None and load is not None and present is None and min(gap.shape) >= COARSE_FROM:
-        start, start_displacement = coarse_guess(grid, gap, load), None
+        start = coarse_guess(grid, gap, load)
     if not overwrite:
         gap, start = gap.copy(), None if start is None else start.copy()
         start_displacement = None if start_displacement is None else start_displacement.copy()
@@ -183,8 +184,8 @@ def solve_contact(
     pressure[absent] = 0
     scale = 1 / float(pressure.sum()) if under_load else 1.0
     pressure *= scale
-    is_extrapolated = start is not None and start_displacement is not None
-    if start_displacement is not None and is_extrapolated:
+    is_extrapolated = start_displacement is not None
+    if start_displacement is not None:
         separation = start_displacement.reshape(-1)
         separation *= scale / unit
         separation += given
@@ -240,7 +241,8 @@ def solve_contact(
             rest = residual - waves.mean(sums)[waves.block]
         direction = passes.taken(grid.inverse(on_grid(rest, cells, size)), cells, size)
         if waves is not None:
-            direction += (waves.pressure(sums) - waves.mean(waves.sums(direction)))[waves.block]
+            eased = passes.block_pressure(waves.blocks, sums, waves.free, waves.local, waves.part)
+            direction += (eased - waves.mean(waves.sums(direction)))[waves.block]
         # Conjugate to the step before, on the cells that are free now.
         direction, requested_size = passes.conjugate(direction, residual, previous, on_grid, cells, under_load)
         caution = CAUTION if waves is None else CAUTION_WITH_BLOCKS

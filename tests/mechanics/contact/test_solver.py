@@ -10,8 +10,9 @@ from support import rough_gap
 
 import roughvisc as rv
 from roughvisc.errors import ConvergenceError
-from roughvisc.mechanics.contact import solve_contact, solver
+from roughvisc.mechanics.contact import solver
 from roughvisc.mechanics.contact.passes import cut_step
+from roughvisc.mechanics.contact.solver import solve_contact
 from roughvisc.mechanics.grid import Grid
 
 BOUNDARIES = pytest.mark.parametrize("boundary", ["free", "periodic"])

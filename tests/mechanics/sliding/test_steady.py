@@ -8,7 +8,7 @@ from references.dense import PERIOD, dense, half_space_symbol, line_profiles, ru
 
 import roughvisc as rv
 from roughvisc.mechanics.body import HALF_SPACE
-from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.contact.solver import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.materials.series import complex_compliance
 from roughvisc.mechanics.sheet import Sheet

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from roughvisc.mechanics.contact import solve_contact
+from roughvisc.mechanics.contact.solver import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.transport import flow
 
