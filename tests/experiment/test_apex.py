@@ -45,8 +45,7 @@ def test_highest__is_the_apex_within_the_cells_of_an_unchanged_indenter():
     tip = rv.cone(0.5, 4.0, 8)
     beside = tip.isel(x=slice(5, None))  # the apex is outside
     for height, highest in ((tip, 0.0), (tip + 1.0, float(tip.max()) + 1.0), (beside, float(beside.max()))):
-        ds = pressed(height, rv.Program().load(1e-3, over=0), edge="accept")
-        assert ds.height.attrs["highest"] == highest
+        assert pressed(height, rv.Program().load(1e-3, over=0), edge="accept").height.attrs["highest"] == highest
 
 
 def test_open__the_approach_is_that_of_the_highest_cells():

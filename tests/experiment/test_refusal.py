@@ -1,6 +1,6 @@
 """Cases that cannot fit into memory: refused before anything is taken, with what would fit."""
 
-import threading
+from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 
 import psutil
@@ -75,22 +75,18 @@ def test_memory__is_limited_by_the_container_and_the_dask_worker(monkeypatch):
 
 
 def test_threads__are_those_asked_for_or_all_for_a_case_that_is_alone():
-    ball, program = rv.sphere(1e-3, 2e-4, 9), rv.Program().load(1e-4, over=0)
+    ball, rubber, program = rv.sphere(1e-3, 2e-4, 9), rv.elastic(1e6), rv.Program().load(1e-4, over=0)
 
     def threads_of(requested):
         found = []
-        settings = {"threads": requested, "progress": lambda *_: found.append(fft.get_workers())}
-        rv.simulate(ball, rv.elastic(1e6), program, **settings)
+        rv.simulate(ball, rubber, program, threads=requested, progress=lambda *_: found.append(fft.get_workers()))
         return found[0]
 
     assert threads_of(3) == 3
     assert threads_of(None) == CPU_COUNT
     with fft.set_workers(5):
         assert threads_of(None) == 5
-    found = []
-    thread = threading.Thread(target=lambda: found.append(threads_of(None)))
-    thread.start()
-    thread.join()
-    assert found == [1], "beside other threads"
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(threads_of, None).result() == 1, "beside other threads"
     with refused("threads", 0):
         threads_of(0)

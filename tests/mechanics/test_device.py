@@ -6,7 +6,6 @@ import pytest
 import support
 
 from roughvisc.mechanics.contact import long_waves, passes, solver
-from roughvisc.mechanics.contact.solver import solve_contact
 from roughvisc.mechanics.grid import Grid
 
 BOUNDARIES = pytest.mark.parametrize("boundary", ["free", "periodic", "mirror"])
@@ -31,8 +30,8 @@ def solved_on_both(xp, boundary, gap, present=None, **given):
     """Solve on NumPy and on the device, compare, and return the state of NumPy."""
     there = None if present is None else xp.asarray(present)
     grids = Grid(gap.shape, SPACING, boundary), Grid(gap.shape, SPACING, boundary, xp=xp)
-    found = solve_contact(grids[0], gap, present=present, **given)
-    other = solve_contact(grids[1], xp.asarray(gap), present=there, **given)
+    found = solver.solve_contact(grids[0], gap, present=present, **given)
+    other = solver.solve_contact(grids[1], xp.asarray(gap), present=there, **given)
     assert (grids[1].convolutions, other.iterations) == (grids[0].convolutions, found.iterations)
     assert_equal(other.pressure, found.pressure)
     assert_equal(other.displacement, found.displacement)

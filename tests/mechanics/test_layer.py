@@ -77,8 +77,7 @@ VISCOUS = rv.kelvin_voigt(1e6, 1e5)
 @pytest.mark.parametrize("hold", [0, 0.1])
 def test_layer_on_a_body_without_instantaneous_compliance__is_at_first_a_bonded_sheet(on, hold):
     ball, rubber, jump = rv.sphere(1e-3, 2e-4, 21), rv.elastic(1e7), rv.Program().load(1e-4, over=0)
-    program = jump.hold(hold) if hold else jump
-    found = rv.simulate(ball, rv.layer(rubber, 2e-5, on=on), program, progress=False)
+    found = rv.simulate(ball, rv.layer(rubber, 2e-5, on=on), jump.hold(hold) if hold else jump, progress=False)
     expected = rv.simulate(ball, rv.sheet(rubber, 2e-5), jump, progress=False)
     assert float(found.approach[0]) == pytest.approx(float(expected.approach[0]), rel=2e-5)
     assert "series" not in found.attrs.get("warnings", "")

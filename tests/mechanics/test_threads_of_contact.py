@@ -9,7 +9,6 @@ from scipy import fft
 
 from roughvisc.mechanics import grid as grids
 from roughvisc.mechanics.contact import long_waves, solver
-from roughvisc.mechanics.contact.solver import solve_contact
 from roughvisc.mechanics.grid import Grid
 
 
@@ -21,14 +20,14 @@ def on_threads(threads, boundary):
 @pytest.mark.parametrize("boundary", ["free", "periodic", "mirror"])
 def test_contact__has_the_same_bits_on_any_threads(monkeypatch, boundary):
     gap = np.random.default_rng(5).random((48, 37))
-    whole = solve_contact(Grid((48, 37), (1.0, 1.3), boundary), gap, load=60.0)
+    whole = solver.solve_contact(Grid((48, 37), (1.0, 1.3), boundary), gap, load=60.0)
     unblocked = Grid((48, 37), (1.0, 1.3), boundary).displacement(whole.pressure)
     monkeypatch.setattr(grids, "THREADED_FROM", 1)
     for name, value in {"COLUMN_BYTES": 1, "COLUMNS": 5, "ROWS": 7}.items():
         monkeypatch.setattr(grids, name, value)
     monkeypatch.setattr(solver, "BLOCKS_FROM", 1)
     monkeypatch.setattr(long_waves, "SPOTS", 0.0)
-    one, *others = (solve_contact(on_threads(threads, boundary), gap, load=60.0) for threads in (1, 2, 3))
+    one, *others = (solver.solve_contact(on_threads(threads, boundary), gap, load=60.0) for threads in (1, 2, 3))
     assert one.iterations > 3
     assert np.abs(one.pressure - whole.pressure).sum() < 2e-3 * whole.pressure.sum()
     grid = on_threads(2, boundary)

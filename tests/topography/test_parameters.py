@@ -44,8 +44,7 @@ def test_rms_slope__of_what_is_near_the_highest_point():
     x = np.arange(40) * 1.0
     ridge = labelled(np.repeat(np.where(x <= 30, 0.1 * x, 3 - 2 * (x - 30))[:, None], 5, 1), (1.0, 1.0))
     assert rms_slope(ridge) == pytest.approx(np.sqrt((30 * 0.01 + 9 * 4) / 39), rel=1e-12)
-    near = squared_slopes(ridge, depth=1.05)
-    assert near.mean() == pytest.approx((11 * 0.01 + 4) / 12, rel=1e-12)
+    assert squared_slopes(ridge, depth=1.05).mean() == pytest.approx((11 * 0.01 + 4) / 12, rel=1e-12)
     assert np.isnan(rms_slope(ridge.where(ridge.x < 1)[:1, :1] * np.nan))
 
 
