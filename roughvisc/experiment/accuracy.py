@@ -121,10 +121,11 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
     if control == "load" or not given:
         approach = apart.approach + point.solver_error_approach + series_error * reached
         approach += INHERITED_APPROACH * unit * reached if remembers else 0.0
-    pressure = (apart.pressure + solved * point.force + of_force) / largest_force if largest_force > 0 else solved
+    stepped = apart.pressure + apart.shared
+    pressure = (stepped + solved * point.force + of_force) / largest_force if largest_force > 0 else solved
     per_force, per_approach = largest_force or math.inf, largest_approach or math.inf
     return {
-        "time_error": max(apart.pressure / per_force, apart.force / per_force, apart.approach / per_approach),
+        "time_error": max(stepped / per_force, apart.force / per_force, apart.approach / per_approach),
         "stated_error": max(pressure, force / per_force, approach / per_approach),
         "residual": point.solver_error,
         "approach_error": approach,

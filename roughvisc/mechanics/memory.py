@@ -367,14 +367,15 @@ def choose_memory(
     """
     share = SERIES_SHARE * tolerance
     if isinstance(body, LayeredBody) and not body.separates:
-        return _of_layers(body, duration, share, shortest, grid)
-    found, error = _series(body.material, shortest, duration, share)
-    memory = Memory(found, duration, keeps_pressure)
-    memory.series_error, memory.misfit = error, body.material.misfit * (duration > 0)
-    if error:
-        memory.note += f" in place of the compliance, within {error:.1e} of it at time zero and from {shortest:.1g} s"
-    active = "no positive series comes nearer: the material is not passive" if error > tolerance else ""
-    memory.note = "; ".join(filter(None, (memory.note, body.material.note, active)))
+        memory: Memory = _of_layers(body, duration, share, shortest, grid)
+    else:
+        found, error = _series(body.material, shortest, duration, share)
+        memory = Memory(found, duration, keeps_pressure)
+        memory.series_error, memory.misfit = error, body.material.misfit * (duration > 0)
+        within = f" in place of the compliance, within {error:.1e} of it at time zero and from {shortest:.1g} s"
+        memory.note = "; ".join(filter(None, (memory.note + within * bool(error), body.material.note)))
+    if memory.series_error > tolerance:
+        memory.note += "; no positive series comes nearer: the material is not passive"
     return memory
 
 
@@ -382,12 +383,13 @@ def _of_layers(body: LayeredBody, duration: float, share: float, shortest: float
     """Return the memory of a layered body: exponentials that all waves share."""
     given = body.materials
     found, errors = zip(*(_series(one, shortest, duration, MATERIALS_SHARE * share) for one in given), strict=True)
-    waves = layer_series(body.of(found), shortest, duration, share - max(errors))
+    # the series of the waves need not be much more accurate than those of the materials
+    waves = layer_series(body.of(found), shortest, duration, max(share - max(errors), SERIES_SHARE * max(errors)))
     memory = LayerMemory(waves, duration, grid)
     memory.series_error, memory.misfit = waves.error + max(errors), max(one.misfit for one in given)
     note = "the instantaneous compliance of each wave"
     if waves.times:
-        within = f"within {memory.series_error:.1e} of them from {shortest:.1g} s on"
+        within = f"within {memory.series_error:.1e} of these from {shortest:.1g} s on"
         note = f"{memory.note} that all waves share, each with compliances of its own, {within}"
     memory.note = "; ".join(filter(None, (note, *(one.note for one in given))))
     return memory

@@ -1,8 +1,8 @@
 """Time stepping: contact under a program of load or approach, on a viscoelastic body, with a stated error.
 
-The solution proceeds by pairs of steps. A coarse solution takes each pair as one step. The difference between both
-solutions is the stated error at the end of the pair, and the change of this difference over the pair controls the
-length of the next pair. No other estimate is needed.
+The solution proceeds by pairs of steps. A coarse solution takes each pair as one step. A part of the difference between
+both solutions is the stated error at the end of the pair, and the change of this difference over the pair controls the
+length of the next pair. The stated error also contains the uncertain pressure of cells that have just entered.
 
 Errors are weighted by the part that relaxation leaves until the next kept time (:meth:`Memory.remaining`). A kept time
 is the end or the middle of a pair.
@@ -228,8 +228,7 @@ class Difference:
     friction : float
         Error of the friction force of a slide. [N]
     shared : float
-        Error of the pressure that both solutions share, in cells that have entered the contact; not part of
-        `pressure`. [N]
+        Further error of the pressure, in cells that have entered the contact, which both solutions share. [N]
     """
 
     pressure: float = 0.0
@@ -241,9 +240,9 @@ class Difference:
     shared: float = 0.0
 
     def or_larger(self, other: Difference, part: float = 1.0) -> Difference:
-        """Return the larger error of each kind, of this difference and a part of the other, without shared errors."""
+        """Return the larger error of each kind, of this one and a part of the other."""
         larger = np.maximum(list(vars(self).values()), part * np.array(list(vars(other).values())))
-        return replace(Difference(*larger.tolist()), shared=0.0)
+        return Difference(*larger.tolist())
 
 
 @dataclass(frozen=True)
@@ -261,7 +260,7 @@ class State:
     length : float
         Length of the next pair; zero after an event. [s]
     difference : Difference
-        Difference between both solutions.
+        Stated error of the time steps.
     largest_force, largest_approach : float
         Largest values so far. [N, m]
     work : float
@@ -410,15 +409,15 @@ def single_step(scene: Scene, state: State, time: float) -> Step:
     if coarse is not fine:
         rule: Rule | None = "linear" if coarse.force == 0 else None
         other = take_step(scene, coarse, time, number, guess=moved(new, coarse, fine), rule=rule)
-    shared = state.difference.shared * scene.memory.remaining(time - fine.time)
-    apart = replace(error_at(scene, fine, new, other), shared=shared)
+    apart = error_at(scene, fine, new, other, scene.motions[number])
+    apart = replace(apart, shared=state.difference.shared * scene.memory.remaining(time - fine.time))
     reached, twice = new, other
     if new.force == 0 == fine.force and not fine.is_late:
         reached = without_past(new)
         twice = reached if other is new else without_past(other)
     work = state.work + work_of_step(scene, fine, new)
     after = after_steps(scene, state, [reached], twice, difference=apart, work=work)
-    return Step(new, replace(apart, pressure=apart.pressure + shared), number, after)
+    return Step(new, apart, number, after)
 
 
 def step_apart(scene: Scene, state: State, closes: float) -> Step:
@@ -432,7 +431,7 @@ def step_apart(scene: Scene, state: State, closes: float) -> Step:
     before, left = (touch(scene, point) - point.approach for point in (state.fine, step.point))
     if scene.can_jump or left >= min(before, scene.tolerance * state.largest_approach):
         return step
-    return step._replace(difference=replace(step.difference, pressure=largest, force=largest))
+    return step._replace(difference=replace(step.difference, pressure=largest, force=largest, shared=0.0))
 
 
 def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
@@ -459,7 +458,10 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
     refused = refused_end = math.inf
     while True:
         # The pair, the same in one step, and the pressures at these instants.
-        middle, last = pair_ends(fine.time, length, event, next_event)
+        if scene.time_step is None:
+            middle, last = pair_ends(fine.time, length, event, next_event)
+        else:
+            middle, last = pair_ends(fine.time, length, event, event, slack=1e-9)
         taken = last - fine.time
         is_soft, lands = memory.grows(taken, SOFT), scene.keeps(last) or middle == event
         first, half = step_of_pair(scene, fine, middle, number, is_soft)
@@ -467,7 +469,8 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         once, other = step_of_pair(scene, coarse, last, number, is_soft, moved(second, coarse, fine))
 
         # Error at the end; errors due to cells that have just entered, in the middle and shared by both solutions.
-        apart = error_at(scene, fine, whole, other)
+        slide = scene.motions[number] if scene.keeps(last) or scene.keeps(middle) else None
+        apart = error_at(scene, fine, whole, other, slide)
         left = 1.0 if is_soft else memory.remaining(middle - fine.time)
         unsure = entering(scene, fine, half)
         carried = state.difference.shared
@@ -514,22 +517,16 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
             break
         del first, second, once, half, whole, other  # frees their memory while the pair is repeated
 
-    slide = scene.motions[number]
-    if slide is not None and scene.keeps(last):
-        apart = replace(apart, friction=abs(friction(scene, whole, slide) - friction(scene, other, slide)))
     between = apart.or_larger(state.difference, left)
     (early, mean), (early_error, error) = work_of_pair(scene, fine, first, second)
     work, curved = state.work + mean, math.hypot(state.work_curved, error)
-    kept = replace(apart, shared=shared)
-    after = after_steps(scene, state, [first, second], once, length, difference=kept, work=work, work_curved=curved)
+    apart = replace(apart, shared=shared)
+    after = after_steps(scene, state, [first, second], once, length, difference=apart, work=work, work_curved=curved)
     work, curved = state.work + early, math.hypot(state.work_curved, early_error)
     work_apart = max(state.work_apart, after.work_apart, key=abs)
     inside = replace(state, work=work, work_curved=curved, work_apart=work_apart)
-    unsure += carried * memory.remaining(middle - fine.time)
-    return [
-        Step(half, replace(between, pressure=between.pressure + unsure), number, inside, is_end=False),
-        Step(whole, replace(apart, pressure=apart.pressure + shared), number, after),
-    ]
+    between = replace(between, shared=unsure + carried * memory.remaining(middle - fine.time))
+    return [Step(half, between, number, inside, is_end=False), Step(whole, apart, number, after)]
 
 
 def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
@@ -558,13 +555,12 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     once = last = points[-1]
     if coarse is not fine or count == 2:
         once = over(coarse, count, last.time, moved(last, coarse, fine))
-    force = friction(scene, last, slide)
-    apart = error_at(scene, fine, last, once)
-    apart = replace(apart, friction=abs(force - friction(scene, once, slide)))
+    apart = error_at(scene, fine, last, once, slide)
     if count == 1:  # the coarse solution takes the same step
         apart = apart.or_larger(state.difference)
     if cells == 1 and not memory.is_elastic:  # there is no solution with longer steps
-        apart = replace(apart, friction=abs(force))
+        apart = replace(apart, friction=abs(friction(scene, last, slide)))
+    apart = replace(apart, shared=state.difference.shared * memory.remaining(last.time - fine.time))
     work, distance = state.work + works[-1], state.distance + count * side
     after = after_steps(scene, state, points[1:], once, difference=apart, work=work, distance=distance)
     inside = replace(state, work=state.work + works[1], distance=state.distance + side)
@@ -643,7 +639,7 @@ def step_of_pair(
     return point, replace(found, time=time, approach=point.approach, before=point.before)
 
 
-def error_at(scene: Scene, before: Point, fine: Point, coarse: Point) -> Difference:
+def error_at(scene: Scene, before: Point, fine: Point, coarse: Point, slide: Slide | None = None) -> Difference:
     """Return the stated errors of a fine solution, from its difference to the coarse solution at the same time.
 
     Parameters
@@ -651,16 +647,21 @@ def error_at(scene: Scene, before: Point, fine: Point, coarse: Point) -> Differe
     scene : Scene
         Input of the time stepping.
     before : Point
-        Last point that both solutions started from.
+        Fine solution before the step.
     fine, coarse : Point
         Both solutions, with the pressures at that time.
+    slide : Slide or None
+        Motion, if the error of the friction force is needed.
     """
     if fine is coarse:
         return Difference()
     grid, (stated, of_approach) = scene.grid, scene.stated
     pressure = stated * (float(abs(fine.pressure - coarse.pressure).sum()) * grid.cell_area)
     approach = of_approach * abs(fine.approach - coarse.approach)
-    apart = Difference(pressure, stated * abs(fine.force - coarse.force), approach)
+    force, rubbed = stated * abs(fine.force - coarse.force), 0.0
+    if slide is not None:
+        rubbed = abs(friction(scene, fine, slide) - friction(scene, coarse, slide))
+    apart = Difference(pressure, force, approach, friction=rubbed)
     if not scene.keeps(fine.time) or fine.force == coarse.force == 0:
         return apart
     gap = scene.gap + scene.memory.displacement(fine.history)[0] - fine.approach
@@ -673,11 +674,11 @@ def error_at(scene: Scene, before: Point, fine: Point, coarse: Point) -> Differe
     if cells and scene.memory.grows(fine.time - before.time, SOFT):
         jumps = entering(scene, before, fine) + ENTERING * float(outside.sum()) * fine.force / cells
     uncertain = grid.cell_area * float(inside.sum()), grid.cell_area * float(outside.sum())
-    return Difference(pressure + jumps, apart.force, approach, *uncertain)
+    return Difference(pressure + jumps, force, approach, *uncertain, rubbed)
 
 
 def entering(scene: Scene, before: Point, after: Point) -> float:
-    """Return the uncertain force of cells that have entered during the first step of a pair. [N]"""
+    """Return the uncertain force of cells that have entered between two points. [N]"""
     compliance = scene.memory.compliance(after.time - before.time)
     creeping = 1 - scene.memory.compliance(0.0) / compliance if compliance > 0 else 0.0
     return ENTERED * creeping * (float(after.pressure[before.pressure == 0].sum()) * scene.grid.cell_area)
@@ -761,24 +762,25 @@ def work_of_step(scene: Scene, before: Point, after: Point, slides: bool = False
 
 
 def touch(scene: Scene, point: Point) -> float:
-    """Return the approach of a point; while the surfaces are apart, the approach at which they last touch. [m]"""
+    """Return the approach of a point; while the surfaces are apart, the approach at which they would just touch. [m]"""
     if point.force > 0:
         return point.approach
     surface = scene.gap + scene.memory.displacement(point.history)[0]
     return max(point.approach, float(surface[scene.solid].min()))
 
 
-def pair_ends(now: float, length: float, event: float, next_event: float) -> tuple[float, float]:
+def pair_ends(now: float, length: float, event: float, next_event: float, slack: float = 0.2) -> tuple[float, float]:
     """Return the middle and the end of the next pair of about a given length. [s]
 
     A near event becomes the end or the middle of the pair. The steps have similar lengths, because the coarse solution
-    differs little from the fine one if one of two steps is much longer.
+    differs little from the fine one if one of two steps is much longer. The pair is longer by at most the part `slack`
+    if this saves a pair.
     """
     first, second = event - now, next_event - event
     if SHORTEST_HALF * length <= first <= LONGEST_HALF * length and second >= first / MOST_UNEQUAL:
         is_near = second <= (MOST_UNEQUAL + SHORTEST_HALF) * first  # leave no very short step
         return event, next_event if is_near else event + MOST_UNEQUAL * first
-    pairs = max(math.ceil((event - now) / length - 0.2), 1)
+    pairs = max(math.ceil((event - now) / length - slack), 1)
     return now + (event - now) / (2 * pairs), event if pairs == 1 else now + (event - now) / pairs
 
 
@@ -830,7 +832,7 @@ def take_step(
     lowest = float(gap[scene.solid].min())
     common = here.history.fields[0] if prediction.grid is None else None  # displacement per unit compliance
     before = (here.time, here.pressure, common) if step > 0 and not here.is_late else None
-    if value == 0 if by_load else value <= lowest:
+    if (value == 0) if by_load else (value <= lowest):
         nothing = grid.xp.zeros(gap.shape)
         history = memory.advance(here.history, prediction, nothing, nothing)
         return Point(time, nothing, 0.0, lowest if by_load else value, history, before, here.start)

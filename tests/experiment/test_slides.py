@@ -41,6 +41,17 @@ def test_result__holds_friction_over_time_and_steps():
     assert "sliding_distance" not in slid(PRESS, times=2)
 
 
+def test_every_row_after_a_slide__states_an_error_of_the_friction():
+    rough = rv.self_affine((SIDE, SIDE), 32, hurst=0.8, rms_slope=0.1, rolloff=SIDE / 2, seed=1)
+    program = rv.Program().load(0.02, over=0).slide(2e-4, speed=1e-3)
+    times = [0.2, 0.211, 0.23, 0.25, 0.28, 0.32, 0.4, 0.5]  # the middle and the end of pairs
+    for after, kept in ((program.hold(0.3), times), (program.load(0.03, over=0).hold(0.01), [0.2])):
+        ds = rv.simulate(
+            rough, rv.zener(3e6, 1e6, 1e5), after, times=kept, boundary="periodic", tolerance=1e-2, progress=False
+        )
+        assert (ds.friction_force_error > 0).all()
+
+
 def test_kept_times__come_to_whole_cells():
     program = PRESS.slide(SIDE, speed=0.1).hold(1e-3)
     asked = [1e-3, 2e-3, 2.1e-3, 2.55e-3, 2.56e-3, program.duration]

@@ -18,6 +18,13 @@ def test_histories__follow_the_closed_form():
     assert (abs(steps.approach.values[1:] - exact) < 1e-3 * exact + 0.1 * (SIDE / CELLS) ** 2 / RADIUS).all()
 
 
+def test_fixed_step__is_the_longest():
+    for step, over, times in ((0.1, 0.24, [0.24]), (0.27, 1.0, [0.3, 1.0])):
+        program, numerics = rv.Program().load(1e-4, over=over), rv.Numerics(time_step=step)
+        ds = rv.simulate(BALL, rv.zener(3e6, 1e6, 2e6), program, times=times, numerics=numerics, progress=False)
+        assert np.diff(ds.roughvisc.steps.time).max() <= step * (1 + 1e-9)
+
+
 def test_force_of_a_whole_step__is_no_history():
     # no compliance at once: under given approach the force of an implicit step is not that at its end
     soft = rv.kelvin_voigt(1e6, 1e6)

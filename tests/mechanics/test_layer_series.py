@@ -7,6 +7,7 @@ from samples import POLYMER
 
 import roughvisc as rv
 from roughvisc.mechanics.layer import crept, layer_series
+from roughvisc.mechanics.memory import choose_memory
 
 FLUID, SOFT = rv.maxwell(1e6, 1e5), rv.kelvin_voigt(1e6, 1e5)
 
@@ -39,3 +40,10 @@ def test_layers_below_one_that_is_rigid_at_first__have_no_instantaneous_influenc
     soft, hard = (rv.layer(RUBBER, 1e-4, on=rv.layer(SOFT, 5e-5, on=rv.elastic(one))).at_once(q) for one in (1e2, 1e9))
     np.testing.assert_allclose(soft, hard, rtol=1e-12)
     assert (rv.layer(SOFT, 1e-4, on=RUBBER).at_once(q) == 0).all()
+
+
+def test_layer_of_a_material_that_is_not_passive__says_so_and_has_few_terms():
+    layered = rv.layer(rv.creep(lambda t: 1e-6 * (1 + 9 * t**4 / (1 + t**4))), 1e-5, on=rv.elastic(1e6))
+    memory = choose_memory(layered, 10.0, 1e-3, 1e-3)
+    assert memory.note.endswith("the material is not passive")
+    assert memory.times.size < 20

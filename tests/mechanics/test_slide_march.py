@@ -169,6 +169,12 @@ def test_held_approach__keeps_it_and_finds_the_force():
     assert steps[-1].point.force > 1.05 * before.point.force, "the body has no time to give way"
 
 
+def test_slide__carries_the_error_of_cells_that_have_entered():
+    program = rv.Program().load(2e-3, over=0.1).slide(0.2 * PERIOD, speed=0.1)
+    steps = list(march(scene(rough((32, 24)), rubber(), program, times=(0.1,), tolerance=0.1)))
+    assert 0 < steps[-1].difference.shared < next(step for step in steps if step.point.time == 0.1).difference.shared
+
+
 def test_slow_slide__is_not_frozen_by_the_tolerance():
     """At a speed at which a cell changes the pressure by less than the tolerance."""
     forces = []

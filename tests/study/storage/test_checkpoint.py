@@ -254,7 +254,7 @@ def test_killed_at_some_file_operations__ends_with_the_same_bits(whole, tmp_path
         assert names(path.parent) == [path.name]
 
 
-@pytest.mark.parametrize("size", ["16k", "500k", "1200k"])
+@pytest.mark.parametrize("size", ["16k", "300k", "600k"])
 def test_full_disk__loses_nothing(whole, tmp_path, small_disk, size):
     """Wherever it strikes: the first rows, a checkpoint, the result itself."""
     case, expected, steps = whole(MODES)
