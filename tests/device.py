@@ -112,9 +112,7 @@ fft = SimpleNamespace(
 
 
 #: One device with 8 GiB, all of it free.
-cuda = SimpleNamespace(
-    runtime=SimpleNamespace(getDeviceCount=lambda: 1, memGetInfo=lambda: (8 << 30, 8 << 30)),
-)
+cuda = SimpleNamespace(runtime=SimpleNamespace(getDeviceCount=lambda: 1, memGetInfo=lambda: (8 << 30, 8 << 30)))
 
 
 def get_default_memory_pool():

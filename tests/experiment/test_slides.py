@@ -17,9 +17,9 @@ def wave(cells=24):
     return rv.wavy(2e-6, SIDE, (SIDE, SIDE), (cells, 2), waves=1)
 
 
-def slid(program, height=None, **settings):
+def slid(program, height=None, rubber=RUBBER, **settings):
     settings = {"boundary": "periodic", "progress": False} | settings
-    return rv.simulate(wave() if height is None else height, RUBBER, program, **settings)
+    return rv.simulate(wave() if height is None else height, rubber, program, **settings)
 
 
 def test_result__holds_friction_over_time_and_steps():
@@ -46,9 +46,7 @@ def test_every_row_after_a_slide__states_an_error_of_the_friction():
     program = rv.Program().load(0.02, over=0).slide(2e-4, speed=1e-3)
     times = [0.2, 0.211, 0.23, 0.25, 0.28, 0.32, 0.4, 0.5]  # the middle and the end of pairs
     for after, kept in ((program.hold(0.3), times), (program.load(0.03, over=0).hold(0.01), [0.2])):
-        ds = rv.simulate(
-            rough, rv.zener(3e6, 1e6, 1e5), after, times=kept, boundary="periodic", tolerance=1e-2, progress=False
-        )
+        ds = slid(after, rough, rv.zener(3e6, 1e6, 1e5), times=kept, tolerance=1e-2)
         assert (ds.friction_force_error > 0).all()
 
 

@@ -23,10 +23,6 @@ def stated_in(unit, h=H):
     return there
 
 
-def masked(values):
-    return np.ma.masked_array(values, mask=np.arange(values.size).reshape(values.shape) == 7)
-
-
 SAME = {
     "um": lambda: stated_in("um"),
     "inch": lambda: stated_in("inch"),

@@ -7,19 +7,7 @@ import zipfile
 import numpy as np
 import pytest
 import xarray as xr
-from scan_files import (
-    CELL,
-    ROOT,
-    SCANS,
-    SHAPE,
-    TABLE,
-    card,
-    file_card,
-    real,
-    refusal,
-    tilted,
-    write_x3p,
-)
+from scan_files import CELL, ROOT, SCANS, SHAPE, TABLE, card, file_card, real, refusal, tilted, write_x3p
 from support import refused
 
 from roughvisc.errors import InputError

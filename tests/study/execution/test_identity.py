@@ -67,10 +67,7 @@ def test_sweep__a_scan_that_changes_is_not_pressed_under_the_old_key(study, scan
     assert not case_path(tmp_path / "out", cases[1].key, "failure").exists()
     again = sweep(study, tmp_path / "out", workers=0, progress=False)
     assert set(again.case_key.values).isdisjoint(case.key for case in cases)
-    xr.testing.assert_equal(
-        again,
-        sweep(study, tmp_path / "fresh", workers=0, progress=False),
-    )
+    xr.testing.assert_equal(again, sweep(study, tmp_path / "fresh", workers=0, progress=False))
 
 
 def test_run__refuses_a_case_whose_scan_is_another_now(study, scan, tmp_path):
