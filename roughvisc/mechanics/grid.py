@@ -32,8 +32,8 @@ except ImportError:
 Array = Any  # an array of NumPy or CuPy
 Boundary = Literal["free", "periodic", "mirror"]
 
-#: Number of rows that are transformed together; bytes of the columns that are, and their least number. The blocks fit
-#: in the cache. Whole fields take up to 1.5 times as long (measured from 64 to 1,024 cells a side).
+#: Number of rows in a block of rows; bytes of a block of columns, and its least number of columns. A block is
+#: transformed at once and fits in the cache: whole fields take up to 1.5 times as long (measured, 64 to 1,024 squared).
 ROWS, COLUMN_BYTES, COLUMNS = 64, 1 << 18, 32
 #: Cells of a field from which blocks are transformed on several threads, and periodic fields in blocks at all: each
 #: block has the same bits on any number of threads. Measured: slower at 512 squared, faster at 1024.
@@ -205,16 +205,16 @@ class Grid:
     def displacement(self, pressure: Array) -> Array:
         """Return the displacement under a pressure, per unit contact compliance: one convolution. [m]
 
-        Under periodic and mirror boundaries the mean displacement of a
-        half-space is zero.
+        Under periodic and mirror boundaries the mean displacement of a half-space is zero.
         """
         return self._convolved(pressure, self._acting, self.points)
 
     def inverse(self, displacement: Array) -> Array:
         """Return approximately the pressure that causes a displacement, in single precision.
 
-        This is the inverse of the periodic kernel on the cells, or of the mirror kernel. In free space its only
-        error is the wrap-around. It is symmetric and positive definite, at a fifth of the cost of a convolution.
+        This is the inverse of the periodic kernel on the cells, or of the mirror kernel. In free space its only error
+        is the wrap-around. It is symmetric and positive definite. It costs a sixth of a convolution in free space, and
+        half of one or more otherwise.
 
         Parameters
         ----------
@@ -381,7 +381,7 @@ class DuccTransforms(Transforms):
 
 
 def convolved_by_cufft(fft: Any, field: Array, symbol: Array) -> Array:
-    """Return the field of a Fourier transform times a symbol that contains the factor of the inverse transform.
+    """Return the convolution of a field with a symbol that contains the factor of the inverse transform.
 
     It calls cuFFT: small transforms take less time than by the functions of CuPy.
     """

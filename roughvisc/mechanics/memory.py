@@ -151,7 +151,8 @@ class Memory:
             rates, basis = np.linalg.eigh(np.diag(own) + np.outer(root, root))
             self.rates = np.maximum(rates, 0.0)
             self.parts = (root @ basis) * (basis.T @ (np.sqrt(weights / driven) * equal))
-        self.fields = 2 if keeps_pressure else 1
+        #: Number of fields of a history.
+        self.field_count = 2 if keeps_pressure else 1
         self.series_error, self.misfit, count = 0.0, 0.0, len(series.times)
         terms = [f"{count} exponential{'s' * (count > 1)}"] * (count > 0) + ["a fluidity"] * (series.fluidity > 0)
         self.note = " and ".join(terms) or "no memory: elastic"
@@ -163,7 +164,7 @@ class Memory:
 
     def start(self, nothing: Array) -> History:
         """Return the memory of a body at rest, from an array of zeros, shape (nx, ny)."""
-        xp, shape = namespace(nothing), (self.fields, *nothing.shape)
+        xp, shape = namespace(nothing), (self.field_count, *nothing.shape)
         return History(xp.zeros(shape, nothing.dtype), xp.zeros((self.times.size, *shape), nothing.dtype))
 
     def predict(self, history: History, step: float, rule: Rule | None = None) -> Prediction:
@@ -197,7 +198,7 @@ class Memory:
         pressure : array, shape (nx, ny)
             Pressure at the end. [Pa]
         """
-        fields = unit[None] if self.fields == 1 else namespace(unit).stack([unit, pressure])
+        fields = unit[None] if self.field_count == 1 else namespace(unit).stack([unit, pressure])
         for mode, weight in zip(prediction.modes, prediction.new, strict=True):
             mode += weight * fields
         # the next step can use BDF2 only if it is stiff and not much longer than this one

@@ -1,4 +1,4 @@
-"""Passes of the contact solver over the free cells. Each returns new vectors, and all its sums together.
+"""Passes of the contact solver over the free cells. Each goes over them once and returns all its sums together.
 
 On a GPU each pass is one kernel of :mod:`roughvisc.mechanics.contact.kernels`, which has the same functions: the launch
 of a kernel and the copy of a number to the host take longer than the pass itself.
@@ -109,7 +109,7 @@ def conjugate(
     Parameters
     ----------
     direction, residual : array, shape (n,)
-        Preconditioned residual, and residual, at the free cells.
+        Preconditioned residual, which is overwritten, and residual, at the free cells.
     last : tuple or None
         The last step.
     on_grid : Scatter

@@ -421,10 +421,10 @@ def neighbours(mask: Array, boundary: Boundary, outside: bool = False) -> Iterat
 def contact_area(
     contact: Array, free: Array, cell_area: float, boundary: Boundary, outside: bool = False
 ) -> tuple[float, float, int]:
-    """Return the area of the cells in contact [m2], and the number of their faces to free cells.
+    """Return the counted area of the contact cells and their corrected area [m2], and the number of their faces.
 
-    Counting cells overestimates the area by a part of the strip along the perimeter. The second area is corrected for
-    it.
+    Counting cells overestimates the area by a part of the strip along the perimeter. The corrected area is without
+    this part. Faces to free cells count.
 
     Parameters
     ----------
