@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import partial
 from importlib import import_module
 from typing import Any
@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.variables import ERRORS, ROW, VARIABLES, axis_of
+from roughvisc.variables import ERRORS, GRID_ERROR, ROW, VARIABLES, axis_of
 
 #: Group of the steps in a result's file, and its title; and the key of the steps in the encoding of a result.
 STEPS, TITLE, CARRIED = "steps", "histories of every accepted step", "roughvisc_steps"
@@ -80,6 +80,22 @@ def warnings_of(attributes: Mapping[Any, Any]) -> dict[str, str]:
     {'slope': 'too steep'}
     """
     return dict(re.findall("^(.+?): (.+)$", str(attributes.get("warnings", "")), re.MULTILINE))
+
+
+def grid_error_of(results: Iterable[Mapping[Any, Any]]) -> str:
+    """Return the largest grid error of some results as text: of the pressure or, for a friction curve, of friction.
+
+    Examples
+    --------
+    >>> grid_error_of([{"grid_error": [0.709, 0.02]}]), grid_error_of([{"force": [1.0]}])
+    ('0.71 of the pressure', 'not estimated (grid_error = true in [solve])')
+    """
+    found = list(results)
+    for quantity, name in (("pressure", GRID_ERROR["pressure"]), ("friction", GRID_ERROR["friction_force"])):
+        if errors := [np.ravel(one[name]) for one in found if np.size(one.get(name, ()))]:
+            largest = np.fmax.reduce(np.concatenate(errors))
+            return "not known" if math.isnan(largest) else f"{largest:.2g} of the {quantity}"
+    return "not estimated (grid_error = true in [solve])"
 
 
 def expect_declared_units(dataset: xr.Dataset) -> None:

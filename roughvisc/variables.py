@@ -197,10 +197,11 @@ _SLIDING = ("sliding_distance", "friction_coefficient", "friction_force", "frict
 _FLOW = ("leak_rate", "transmissivity", "hydraulic_aperture")
 IN_TABLE = ("time", "speed", *_CONTACT, *_SLIDING, *_FLOW, *CONDUCTANCES)
 LARGEST_IN_TABLE = ("stated_error", *dict.fromkeys(GRID_ERROR.values()))
-#: Variable -> variables that may state its error. The variable `time_error` is about the time steps, not the time.
+#: Variable -> variables that may state its error. The variable `time_error` is about the time steps, not the time. The
+#: force is prescribed, or has an error below the error of the pressure, which `grid_error` states.
 ERRORS = {
     name: tuple(one for one in (f"{name}_error", GRID_ERROR.get(name, "")) if one in VARIABLES) for name in VARIABLES
-} | {"time": ()}
+} | {"time": (), "force": ()}
 
 
 @dataclass(frozen=True)

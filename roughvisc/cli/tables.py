@@ -14,7 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from roughvisc.errors import printable
-from roughvisc.labels import cost_of
+from roughvisc.labels import cost_of, grid_error_of
 from roughvisc.topography.grid import spacing
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, ERRORS, IN_TABLE, VARIABLES, axis_of
@@ -80,9 +80,15 @@ def result_table(dataset: xr.Dataset) -> Group:
                 kind = "numerical" if error == f"{name}_error" else "grid"
                 text += f"; {kind} error {readable(float(row[error]), VARIABLES[error].units)}"
             rows.append((f"{VARIABLES[name].label} {where}", text))
+        if name == "contact_area" and name in row and not axis.telling:
+            most = dataset.isel({axis.name: int(np.argmax(dataset[name].values))})
+            text, place = readable(float(most[name]), "m^2"), axis.place(float(most[axis.name]), 3)
+            if text != readable(float(row[name]), "m^2"):
+                rows.append((f"Largest {VARIABLES[name].label.lower()}", f"{text} at {place}"))
     seconds, convolutions = cost_of(dataset)
     tolerance = dataset.attrs.get("tolerance", math.nan)
     rows.append(("Accuracy: worst stated error", f"{worst_error([dataset])}, tolerance {tolerance:g}"))
+    rows.append(("Accuracy: worst grid error", grid_error_of([dataset])))
     rows.append(("Cost: convolutions", f"{convolutions:.0f}"))
     rows.append(("Cost: wall time", readable(seconds, "s")))
     return two_columns(rows, dataset.attrs.get("title"))
@@ -108,6 +114,7 @@ def sweep_table(outcomes: Sequence[Outcome], total: int, title: str) -> Group:
         ("Finished", f"{len(finished)}, {reused} of them before" if reused else len(finished)),
         *((kind.capitalize(), count) for kind, count in kinds.items()),
         ("Accuracy: worst stated error", worst_error(entry.arrays for entry in finished)),
+        ("Accuracy: worst grid error", grid_error_of(entry.arrays for entry in finished)),
         ("Cost: total wall time", readable(sum(one.seconds for one in outcomes if not one.reused), "s")),
     ]
     return two_columns(rows, title)

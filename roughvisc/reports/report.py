@@ -18,7 +18,7 @@ from jinja2 import Environment, PackageLoader
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
-from roughvisc.labels import cost_of, warnings_of
+from roughvisc.labels import cost_of, grid_error_of, warnings_of
 from roughvisc.observables.frames import expect_result
 from roughvisc.plot import style
 from roughvisc.plot.fields import surface
@@ -148,6 +148,7 @@ def _cells(dataset: xr.Dataset) -> dict[str, str]:
         worst, tolerance = float(dataset["stated_error"].max()), dataset.attrs.get("tolerance", np.inf)
         above = f", above the tolerance of {tolerance:g}" if worst > tolerance else ""
         cells[VARIABLES["stated_error"].label] = f"{worst:.2g}{above}"
+    cells[VARIABLES["grid_error"].label] = grid_error_of([dataset])
     if np.isfinite(seconds := cost_of(dataset)[0]):
         cells["Wall time"] = unit_for([seconds], "s").text(seconds)
     if warnings := warnings_of(dataset.attrs):

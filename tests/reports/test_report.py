@@ -89,6 +89,7 @@ def test_page__of_a_result_without_a_study(within, tmp_path):
     assert ("<td>0.003, above the tolerance of 0.001</td>" in text) == (not within)
     assert ("<td>0.003</td>" in text) == within
     assert "do not record the whole study" in text
+    assert "<td>not estimated (grid_error = true in [solve])</td>" in text
     with pytest.raises(InputError, match="out is None"):
         report(ds)
 
