@@ -123,13 +123,7 @@ TABLES = {
         for name, one in RECIPES.items()
     },
     "material: any": ("material", _of(stiffened, modulus_factor="factor")),
-    **{
-        f"material: {name}": (
-            "material",
-            _all(one, "note", "stands_for", "longest", "warning", "misfit"),
-        )
-        for name, one in MODELS.items()
-    },
+    **{f"material: {name}": ("material", _all(one)) for name, one in MODELS.items()},
     "material: temperature": (
         "material",
         _of(rv.wlf, "temperature", "reference_temperature", "wlf_c1", "wlf_c2")

@@ -6,6 +6,7 @@ name the key, the value and the valid values.
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
 import inspect
 import re
@@ -102,10 +103,12 @@ def check(function: Callable[..., Any], where: str, table: Mapping[str, Any], da
 
 @cache
 def arguments(function: Callable[..., Any], skipped: int = 0) -> dict[str, tuple[Any, Any]]:
-    """Return type and default of each argument of a function, without the first ones."""
+    """Return type and default of each argument of a function, without the first ones and fields outside the repr."""
     hints = get_type_hints(function)
     parameters = list(inspect.signature(function).parameters.values())[skipped:]
-    return {one.name: (hints.get(one.name, Any), one.default) for one in parameters}
+    stated = dataclasses.fields(function) if dataclasses.is_dataclass(function) else ()
+    hidden = {one.name for one in stated if not one.repr}
+    return {one.name: (hints.get(one.name, Any), one.default) for one in parameters if one.name not in hidden}
 
 
 @cache

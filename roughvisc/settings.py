@@ -138,6 +138,8 @@ class Settings(Numerics):
             try:
                 times = tuple(np.unique(np.asarray(in_si(times, "s", "times"), dtype=float)).tolist())
             except (TypeError, ValueError) as error:  # an InputError is a ValueError
+                if getattr(error, "key", "times") != "times":  # one entry of a list
+                    raise
                 expected = "a number of times, a list of times [s], or None"
                 raise InputError(key="times", found=self.times, expected=expected) from error
         names = tuple(self.fields) if isinstance(self.fields, Iterable) else (self.fields,)

@@ -281,9 +281,7 @@ def test_plot__draws_a_file_or_a_folder(invoke, tmp_path, coarse_pictures, monke
     monkeypatch.setattr("roughvisc.progress.LINE_EVERY", math.inf)  # the machine may be slow
     path = write_result(rough_creep(shape=(24, 20), frames=4), tmp_path / "out" / "case.nc")
     for target in (path, path.parent):
-        status, out, err = invoke("plot", target, "--out", "figures")
-        assert (status, err) == (0, "")
-        assert out == "2 figures: figures\n"
+        assert invoke("plot", target, "--out", "figures") == (0, "2 figures: figures\n", "")
     assert {one.name for one in (tmp_path / "figures").iterdir()} == {"case-history.png", "case-maps.png"}
     status, out, err = invoke("plot", path, "--all", "--out", "all")
     drawn = {one.name for one in (tmp_path / "all").iterdir()}

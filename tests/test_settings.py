@@ -38,7 +38,6 @@ def test_defaults__are_the_same_in_python_in_a_study_and_in_the_value():
         ("time_step", "10 mm"),
         ("times", 0),
         ("times", {0.1}),
-        ("times", [0.1, "soon"]),
         ("fields", None),
         ("fields", ("gap", "stress")),
         ("device", "tpu"),

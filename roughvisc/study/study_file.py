@@ -5,6 +5,7 @@ A table contains the arguments of one function, which checks them; see :mod:`rou
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -364,7 +365,7 @@ def settings_of(tables: Mapping[str, Any], experiment: Experiment) -> Settings:
     try:
         settings = call(Settings, "", stated)
     except InputError as error:
-        raise located(error, TABLE_OF[error.key.partition(".")[0]]) from error
+        raise located(error, TABLE_OF[re.split(r"[.\[]", error.key)[0]]) from error
     boundary = settings.boundary
     if boundary == "auto":
         made_for = "free" if settings.edge == "accept" else surface_boundary(tables["surface"])

@@ -16,7 +16,19 @@ from typing import Any
 
 import xarray as xr
 
-from roughvisc.arguments import NoData, a_table, call, check, check_keys, dotted, one_key, one_of, split
+from roughvisc.arguments import (
+    NoData,
+    a_table,
+    arguments,
+    call,
+    check,
+    check_keys,
+    dotted,
+    one_key,
+    one_of,
+    refuse_unknown,
+    split,
+)
 from roughvisc.errors import InputError
 from roughvisc.tables import regular
 from roughvisc.topography.conditioning import FACE_STEPS, STEPS, boundary_after, condition
@@ -244,8 +256,13 @@ def check_surface(table: Mapping[str, Any], where: str = "surface") -> None:
     table = a_table(where, table)
     source_key = one_key(where, table, ("file", "generate"))
     is_second = where != "surface"
-    steps, rest = split(table, *(FACE_STEPS if is_second else STEPS))
-    placing, source = split(rest, *(("flip", "offset") if is_second else ("second", "missing")))
+    step_keys = FACE_STEPS if is_second else tuple(STEPS)
+    place_keys = ("flip", "offset") if is_second else ("second", "missing")
+    steps, rest = split(table, *step_keys)
+    placing, source = split(rest, *place_keys)
+    recipe = one_of(f"{where}.generate", table["generate"], RECIPES) if source_key == "generate" else ""
+    known = arguments(RECIPES[recipe]) if recipe else arguments(open_scan, 1)
+    refuse_unknown(where, table, (source_key, *known, *step_keys, *place_keys))
     condition(NoData(), steps, where)
     if source_key == "generate":
         check_recipe(where, source)

@@ -36,7 +36,7 @@ ROUGH = {"generate": "self_affine", "size": "3 mm", "shape": 24, "hurst": 0.8, "
     [
         ({"material.shear_modulus": "3 MN"}, "material.shear_modulus", "3 MN"),
         ({"material.kelvin_modulus": None}, "material.kelvin_modulus", None),
-        ({"material.young_modulus": 9}, "material.young_modulus", 9),
+        ({"material": {"model": "prony", "glassy": 1e-6, "longest": 3}}, "material.longest", 3),
         ({"material.model": "zenner"}, "material.model", "zenner"),
         ({"materials": 1}, "materials", 1),
         ({"material": None}, "material", None),
@@ -55,6 +55,7 @@ ROUGH = {"generate": "self_affine", "size": "3 mm", "shape": 24, "hurst": 0.8, "
         ({"program.1.control": "force"}, "program.1.control", "force"),
         ({"keep.fields": ["presure"]}, "keep.fields", ["presure"]),
         ({"keep.times": [1, "7 s"]}, "keep.times", 7.0),
+        ({"keep.times": [1, "1,5 s"]}, "keep.times.1", "1,5 s"),
         ({"program.1": {"slide": "1 mm", "speed": "1 mm/s"}, "solve.boundary": "free"}, "solve.boundary", "free"),
     ],
     ids=str,

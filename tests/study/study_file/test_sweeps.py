@@ -3,6 +3,7 @@
 import pytest
 from support import refused
 
+from roughvisc.errors import InputError
 from roughvisc.study.case import read_study, vary
 
 ROUGH = {"generate": "self_affine", "size": "1 mm", "shape": [9, 7], "hurst": 0.8, "rms_slope": 0.1, "seed": 5}
@@ -123,3 +124,8 @@ def test_realisations__are_refused_if_the_surface_has_none(realised, surface, sw
 def test_sweep__is_refused_at_the_key(read, sweep, key):
     with refused(key):
         read(sweep=sweep)
+
+
+def test_sweep__of_a_misspelt_step_suggests_the_step(read):
+    with pytest.raises(InputError, match=r"surface\.fliter: unknown key; did you mean 'filter'\?"):
+        read(sweep={"surface.fliter": ["2 um"]})
