@@ -99,10 +99,11 @@ class Prony:
 
     def creep_compliance(self, t: ArrayLike) -> Array:
         """Return the shear creep compliance ``J(t)``, [1/Pa]; times beyond the longest one are refused. [s]"""
+        t = np.asarray(t, dtype=float)
         if not (latest := np.max(t, initial=0.0)) <= self.longest * (1 + 1e-12):  # beyond rounding of a sum of steps
             late = f"creep is requested at {latest:g} s, and the table ends at {self.longest:g} s"
             raise InputError(f"{late}: expected a table as long as the program; creep data are not extrapolated")
-        t = np.asarray(np.minimum(t, self.longest), dtype=float)
+        t = np.minimum(t, self.longest)
         retarded = np.add.reduce(self.compliances * -np.expm1(-t[..., None] / np.array(self.times)), axis=-1)
         flowed = self.fluidity * t if self.fluidity else 0.0  # a solid has a limit at inf
         return np.asarray(self.glassy + flowed + retarded)
