@@ -99,13 +99,14 @@ class Prony:
 
     def creep_compliance(self, t: ArrayLike) -> Array:
         """Return the shear creep compliance ``J(t)``, [1/Pa]; times beyond the longest one are refused. [s]"""
-        t = np.asarray(t, dtype=float)
-        if not (latest := np.max(t, initial=0.0)) <= self.longest * (1 + 1e-12):  # beyond rounding of a sum of steps
+        asked = np.asarray(t, dtype=float)
+        latest = np.max(asked, initial=0.0)
+        if not latest <= self.longest * (1 + 1e-12):  # beyond rounding of a sum of steps
             late = f"creep is requested at {latest:g} s, and the table ends at {self.longest:g} s"
             raise InputError(f"{late}: expected a table as long as the program; creep data are not extrapolated")
-        t = np.minimum(t, self.longest)
-        retarded = np.add.reduce(self.compliances * -np.expm1(-t[..., None] / np.array(self.times)), axis=-1)
-        flowed = self.fluidity * t if self.fluidity else 0.0  # a solid has a limit at inf
+        known = np.minimum(asked, self.longest)
+        retarded = np.add.reduce(self.compliances * -np.expm1(-known[..., None] / np.array(self.times)), axis=-1)
+        flowed = self.fluidity * known if self.fluidity else 0.0  # a solid has a limit at inf
         return np.asarray(self.glassy + flowed + retarded)
 
     def contact_compliance(self, t: ArrayLike) -> Array:
