@@ -449,8 +449,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         return [single_step(scene, state, fine.time + (event - fine.time) / parts if parts > 1 else event)]
 
     control, memory = segment.control, scene.memory
-    length = 2 * scene.time_step if scene.time_step is not None else state.length
-    length = length or FIRST_PAIR * min(segment.duration, segment.period)
+    length = 2 * (scene.time_step or 0.0) or state.length or FIRST_PAIR * min(segment.duration, segment.period)
     if segment.amplitude and scene.time_step is None:
         length = min(length, segment.period / PAIRS_OF_A_CYCLE)
     next_event = min(scene.next_kept(event), end)
@@ -458,8 +457,11 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
     refused = refused_end = math.inf
     while True:
         # The pair, the same in one step, and the pressures at these instants.
-        if scene.time_step is None:
+        fixed = (scene.time_step or 0.0) * (1 + 1e-9)
+        if not fixed:
             middle, last = pair_ends(fine.time, length, event, next_event)
+        elif event - fine.time <= fixed and event < next_event <= event + fixed:
+            middle, last = event, next_event
         else:
             middle, last = pair_ends(fine.time, length, event, event, slack=1e-9)
         taken = last - fine.time

@@ -6,6 +6,7 @@ of a kernel and the copy of a number to the host take longer than the pass itsel
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -175,18 +176,15 @@ def line_search(
         return curvature, minimum, 1.0 if minimum > 0.5 else minimum
     if minimum <= 1:
         return curvature, minimum, minimum
-    shrinking = change < 0
-    if not bool(shrinking.any()):
-        return curvature, minimum, minimum
-    return curvature, minimum, min(minimum, 1 / float((-change[shrinking] / held[shrinking]).max()))
+    steepest = float((-change / namespace(held).where(held > 0, held, math.inf)).max())
+    return curvature, minimum, min(minimum, 1 / steepest) if steepest > 0 else minimum
 
 
 class Scatter:
     """Field of zeros that receives the values of some cells."""
 
     def __init__(self, zeros: Array) -> None:
-        self.zeros, self.flat = zeros, zeros.reshape(-1)
-        self.cells: Array | slice = slice(0, 0)
+        self.zeros, self.flat, self.cells = zeros, zeros.reshape(-1), zeros.reshape(-1)[:0].astype(int)
 
     def __call__(self, values: Array, cells: Array, divisor: float | None = None) -> Array:
         """Return the field with these values, in single precision if they are divided; the next call overwrites it."""
