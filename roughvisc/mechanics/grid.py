@@ -117,8 +117,8 @@ class Grid:
         Transform of the kernel. [m]
     definite : bool
         Whether a uniform pressure displaces the surface.
-    stiffest : float
-        Largest eigenvalue of the convolution, or a bound on it. [m]
+    largest_eigenvalue : float
+        Displacement over pressure of the most compliant wave, or a bound on it; a cell side if no wave is known. [m]
     self_influence : float
         Displacement of a cell under unit pressure on that cell alone: the mean eigenvalue. On a mirrored surface, the
         mean over all cells. [m]
@@ -150,7 +150,7 @@ class Grid:
             self.points = 2 * fast(shape[0], real=True), 2 * fast(shape[1], real=True)
         self.symbol = xp.asarray(self.symbol_of(kernel) if symbol is None else symbol)
         self.definite = boundary == "free" or float(self.symbol[0, 0]) > 0
-        self.stiffest = float(self.symbol.max()) or spacing[0]
+        self.largest_eigenvalue = float(self.symbol.max()) or spacing[0]
         number = np.arange(self.symbol.shape[1])  # of the wave along y, which stands for the negative number too
         twice = (boundary != "mirror") & (number > 0) & (2 * number < self.points[1])
         self.self_influence = float((self.symbol.sum(axis=0) * xp.asarray(1.0 + twice)).sum()) / math.prod(self.points)

@@ -486,7 +486,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         # Errors are relative to the largest values, but an approach counts as at least its rounding error: a flat
         # surface with periodic boundaries has no larger approach.
         force = max(state.largest_force, first.force, second.force, 1e-300)
-        rounding = ROUNDING * memory.compliance(last) * scene.grid.stiffest * force / scene.gap.size
+        rounding = ROUNDING * memory.compliance(last) * scene.grid.largest_eigenvalue * force / scene.gap.size
         approach = max(state.largest_approach, abs(first.approach), abs(second.approach), 1e-300)
         approach = max(approach, rounding / scene.grid.cell_area)
         ratio = added(scene, state, second, once, force, approach)

@@ -163,7 +163,7 @@ def solve_contact(
     # Divide pressures and lengths by one pressure, and measure lengths from the lowest point: the load is then one.
     lowest_gap = float(gap.min() if present is None else gap.reshape(-1)[present].min())
     overlap = 0.0 if approach is None else approach - lowest_gap
-    unit = load if load is not None else (overlap / grid.stiffest if overlap > 0 else 1.0)
+    unit = load if load is not None else (overlap / grid.largest_eigenvalue if overlap > 0 else 1.0)
     given = gap.reshape(-1)
     given -= lowest_gap
     given /= unit
@@ -180,7 +180,7 @@ def solve_contact(
         pressure[pressure < 0] = 0
         pressure /= unit
     else:
-        pressure = xp.ones(gap.size) if under_load else xp.maximum(level - given, 0) / grid.stiffest
+        pressure = xp.ones(gap.size) if under_load else xp.maximum(level - given, 0) / grid.largest_eigenvalue
     pressure[absent] = 0
     scale = 1 / float(pressure.sum()) if under_load else 1.0
     pressure *= scale
@@ -257,7 +257,7 @@ def solve_contact(
                 break
             length, previous = length / 4, None
         if not slope < 0:
-            moved = held - residual / grid.stiffest
+            moved = held - residual / grid.largest_eigenvalue
             trial = onto_simplex(moved, total) if under_load else xp.maximum(moved, 0)
             change, length, best, stalled, previous = trial - held, 1.0, duality, 0, None
             slope = inner(change, residual)
