@@ -96,8 +96,8 @@ def long(*values):
         ("zener_equal", "jump", uniform, 16),
         thorough("maxwell", "triangle", uniform, 32),
         thorough("maxwell", "triangle", random, 16),
-        thorough("power_law", "jump", graded, 16),  # the rate of creep after a jump is singular
-        long("two_branches", "jump", random, 32),
+        thorough("power_law", "jump", graded, 32),  # the rate of creep after a jump is singular
+        long("two_branches", "jump", random, 64),
         long("zener_soft", "triangle", random, 320),
     ],
 )
