@@ -99,14 +99,9 @@ class Prony:
 
     def creep_compliance(self, t: ArrayLike) -> Array:
         """Return the shear creep compliance ``J(t)``, [1/Pa]; times beyond the longest one are refused. [s]"""
-        asked = np.asarray(t, dtype=float)
-        latest = np.max(asked, initial=0.0)
-        if not latest <= self.longest * (1 + 1e-12):  # beyond rounding of a sum of steps
-            late = f"creep is requested at {latest:g} s, and the table ends at {self.longest:g} s"
-            raise InputError(f"{late}: expected a table as long as the program; creep data are not extrapolated")
-        known = np.minimum(asked, self.longest)
-        retarded = np.add.reduce(self.compliances * -np.expm1(-known[..., None] / np.array(self.times)), axis=-1)
-        flowed = self.fluidity * known if self.fluidity else 0.0  # a solid has a limit at inf
+        t = known_times(t, self.longest)
+        retarded = np.add.reduce(self.compliances * -np.expm1(-t[..., None] / np.array(self.times)), axis=-1)
+        flowed = self.fluidity * t if self.fluidity else 0.0  # a solid has a limit at inf
         return np.asarray(self.glassy + flowed + retarded)
 
     def contact_compliance(self, t: ArrayLike) -> Array:
@@ -115,8 +110,7 @@ class Prony:
 
     def contact_integral(self, t: ArrayLike) -> Array:
         """Return the integral ``int_0^t C``. [s/Pa]"""
-        self.creep_compliance(t)  # refuses times beyond the longest one
-        t = np.asarray(np.minimum(t, self.longest), dtype=float)
+        t = known_times(t, self.longest)
         crept = np.add.reduce(self.compliances * one_less_mean_decay(t[..., None] / np.array(self.times)), axis=-1) * t
         return np.asarray(0.5 * (1 - self.poisson) * (self.glassy * t + self.fluidity * t**2 / 2 + crept))
 
@@ -131,6 +125,16 @@ class Prony:
             longest=time_factor * self.longest,
             note="; ".join(filter(None, (self.note, note))),
         )
+
+
+def known_times(t: ArrayLike, longest: float) -> Array:
+    """Return times up to the longest one, beyond which a material is not known. [s]"""
+    t = np.asarray(t, dtype=float)
+    latest = np.max(t, initial=0.0)
+    if not latest <= longest * (1 + 1e-12):  # beyond rounding of a sum of steps
+        late = f"creep is requested at {latest:g} s, and the table ends at {longest:g} s"
+        raise InputError(f"{late}: expected a table as long as the program; creep data are not extrapolated")
+    return np.minimum(t, longest)
 
 
 # (-1)^(k+1) / (k+1)! for k >= 1: up to 0.3 the next term is below rounding
