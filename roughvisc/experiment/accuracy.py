@@ -18,7 +18,7 @@ from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import SHORTEST_PAIR, Scene, Step
 from roughvisc.settings import Settings, kept_times
 from roughvisc.topography.borders import JUMP, border_mismatch
-from roughvisc.topography.grid import squared_slopes
+from roughvisc.topography.grid import rms_slope
 from roughvisc.topography.recipes import indenter_of, is_analytic
 from roughvisc.units import format_quantity
 
@@ -107,7 +107,7 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
     """
     point, state, apart = step.point, step.state, step.difference
     control = scene.program.segments[step.segment].control
-    given, remembers = scene.program.states[step.segment], not scene.memory.is_elastic
+    given, remembers = scene.program.prescribes[step.segment], not scene.memory.is_elastic
     largest_force, largest_approach = largest
     loaded, reached = max(state.largest_force, point.force), max(state.largest_approach, abs(point.approach))
     of_force = series_error * loaded
@@ -194,8 +194,7 @@ def slope_warning(height: xr.DataArray, boundary: str, approach: float) -> str:
     approach : float
         Largest approach at kept times, from the highest cell. [m]
     """
-    depth = approach if boundary == "free" else math.inf
-    slope = math.sqrt(squared_slopes(height, boundary == "periodic", depth).mean())
+    slope = rms_slope(height, boundary == "periodic", approach if boundary == "free" else math.inf)
     if not slope > LARGEST_SLOPE:
         return ""
     return (
@@ -246,7 +245,7 @@ def wakes_of(scene: Scene, profile: Profile, pressure: Array | None) -> str:
                 path, speed = path + segment.slide.distance, segment.slide.distance / segment.duration
                 crept = scene.memory.compliance(min(period / speed, end))
                 left[speed] = 1.0 - crept / scene.memory.compliance(end)
-        # on a shorter path the contact does not reach the next wake
+        # on a shorter path the contact does not reach the wake of its neighbour
         if path >= period / 2 and stands_alone(profile.height, pressure, axis):
             wakes.append(wake_warning(left, period))
     return " ".join(wakes)

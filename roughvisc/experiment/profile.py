@@ -62,6 +62,8 @@ class Profile:
         the recipe reproduces the heights and the apex lies within the outline of the cells. [m]
     gap : ndarray, shape (nx, ny)
         Undeformed gap at first touch, zero at absent cells. [m]
+    is_indenter : bool
+        Whether the recipe of a sphere, cone or flat punch reproduces the heights.
     least_gap, mean_gap : float
         Least gap, which is positive if the highest point lies between the cells, and mean gap of the present cells. [m]
     spacing : tuple of float
@@ -92,6 +94,7 @@ class Profile:
             )
         self.height, self.kernel = height, kernel
         self.highest, indenter = float(np.nanmax(values)), indenter_of(height)
+        self.is_indenter = indenter is not None
         if indenter is not None:
             sides, apex = np.array(indenter[1]), np.array(indenter[2])
             x, y = height["x"].values, height["y"].values
@@ -201,7 +204,7 @@ def choose_surface(
     """
     body, settings, estimate = problem.body, problem.settings, Estimate()
     times = enlarged or 0
-    can_adapt = not body.kernel.raises_surface or indenter_of(profile.height) is not None
+    can_adapt = not body.kernel.raises_surface or profile.is_indenter
     if settings.boundary == "free" and settings.edge == "error" and can_adapt:
         compliance = float(body.material.contact_compliance(program.duration))
         for _ in range(times):
@@ -233,7 +236,7 @@ def cropped(whole: Domain, profile: Profile, estimate: Estimate, growth: float) 
         Factor of the approach, or of the size of the contact of an indenter.
     """
     gap, shape, outside, wider, corners = profile.gap, whole.shape, math.inf, 0, estimate.cells
-    is_connected = corners is not None and indenter_of(profile.height) is not None
+    is_connected = corners is not None and profile.is_indenter
     if corners is None or not is_connected:
         corners = np.argwhere(gap <= MARGIN * growth * estimate.approach)
     if not corners.size:
@@ -274,7 +277,7 @@ def estimated(profile: Profile, compliance: float, program: Program) -> Estimate
     for number, segment in enumerate(program.segments):
         if segment.control == "approach":
             approach = max(approach, segment.end + abs(segment.amplitude) if segment.end else 0.0)
-        elif not program.states[number]:
+        elif not program.prescribes[number]:
             return Estimate()
     pushes = [{"approach": approach}] if approach > least else []
     if program.largest_load * compliance > 0:

@@ -473,13 +473,13 @@ class Program:
         return start + (end - start) * (elapsed / segment.duration)
 
     @cached_property
-    def states(self) -> list[bool]:
-        """Whether the program states the value of each segment; a hold may keep a computed value instead."""
+    def prescribes(self) -> list[bool]:
+        """Whether the program prescribes the value of each segment; a hold may keep a computed value instead."""
         found, control = list[bool](), self.segments[0].control if self.segments else "load"
         for segment in self.segments:
-            is_stated = segment.end is not None or (segment.control == control and (not found or found[-1]))
+            is_prescribed = segment.end is not None or (segment.control == control and (not found or found[-1]))
             control = segment.control
-            found.append(is_stated)
+            found.append(is_prescribed)
         return found
 
     @cached_property

@@ -18,8 +18,7 @@ from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.materials.creep import Material, check_material
 from roughvisc.mechanics.steady_sliding import Sliding
 from roughvisc.observables.frames import history, need
-from roughvisc.topography.grid import nominal_area, spacing
-from roughvisc.topography.parameters import rms_slope
+from roughvisc.topography.grid import nominal_area, rms_slope, spacing
 from roughvisc.topography.spectrum import wavevectors
 
 Array = NDArray[np.float64]

@@ -18,8 +18,7 @@ from roughvisc.observables.frames import expect_result
 from roughvisc.observables.theory import asperity_fraction, persson_fraction
 from roughvisc.plot import style
 from roughvisc.study.trade import format_tolerance, pareto_front, uncertainty
-from roughvisc.topography.grid import nominal_area
-from roughvisc.topography.parameters import rms_slope
+from roughvisc.topography.grid import nominal_area, rms_slope
 from roughvisc.units import Unit, quantities, unit_for
 from roughvisc.variables import AXES, GRID_ERROR, VARIABLES, axis_of
 

@@ -24,7 +24,7 @@ from roughvisc.mechanics.sheet import BASE, Base, Sheet, factors
 from roughvisc.observables.frames import expect_result, history
 from roughvisc.topography.borders import border_mismatch
 from roughvisc.topography.framing import mirror
-from roughvisc.topography.grid import spacing, squared_slopes
+from roughvisc.topography.grid import rms_slope, spacing
 from roughvisc.topography.recipes import is_analytic, recipe_name
 from roughvisc.topography.spectrum import hann, last_octave
 from roughvisc.units import Quantity, format_quantity, quantities
@@ -139,7 +139,7 @@ class Scene:
     def loaded_slope(self) -> float:
         """Root mean square slope of the loaded surface: in free space, of the part above the largest approach. [-]"""
         depth = float(self.dataset["approach"].max()) if self.boundary == "free" else math.inf
-        slope = math.sqrt(squared_slopes(self.height, self.boundary == "periodic", depth).mean())
+        slope = rms_slope(self.height, self.boundary == "periodic", depth)
         if math.isnan(slope):
             raise NotKnown("The result contains no loaded heights.")
         return slope

@@ -16,8 +16,8 @@ from roughvisc.mechanics.contact.solver import contact_area, solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.materials.prony import zener
 from roughvisc.topography.conditioning import condition
+from roughvisc.topography.grid import rms_slope
 from roughvisc.topography.inspection import Inspection
-from roughvisc.topography.parameters import rms_slope
 from roughvisc.topography.scans import surface_table, written_quantity
 
 #: Text of a first study, with comments.

@@ -46,8 +46,7 @@ from roughvisc.study.case import Case, labels_of, parameters_of, read_cases
 from roughvisc.study.execution.cluster import processes_that_fit, threads_each
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.storage.folder import existing_part
-from roughvisc.topography.grid import nominal_area, spacing
-from roughvisc.topography.parameters import rms_slope
+from roughvisc.topography.grid import nominal_area, rms_slope, spacing
 from roughvisc.variables import STEPPED
 
 #: Numbers of a plan -> unit; texts of a plan.

@@ -129,7 +129,9 @@ def in_metres(numbers: Any, name: str) -> np.ndarray:
 
 
 def spacing(h: xr.DataArray | xr.Dataset, step: str = "spacing") -> tuple[float, float]:
-    """Return the cell sides (dx, dy) of a grid, the steps between the centres; a single cell begins at zero. [m]
+    """Return the cell sides (dx, dy) of a grid: the distances between neighbouring centres. [m]
+
+    A single cell begins at zero, so that its side is twice the coordinate of its centre.
 
     Parameters
     ----------
@@ -185,6 +187,14 @@ def cell_edges(h: xr.DataArray | xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
         ends[np.abs(ends) < 1e-9 * side] = 0.0  # removes rounding where the grid begins
         edges.append(ends)
     return edges[0], edges[1]
+
+
+def rms_slope(h: xr.DataArray, periodic: bool = False, depth: float = math.inf) -> float:
+    """Return the root mean square slope, Sdq of :func:`roughvisc.parameters`; see :func:`squared_slopes`. [-]
+
+    The result is NaN if no corner counts.
+    """
+    return math.sqrt(squared_slopes(checked(h, "rms_slope", least=1), periodic, depth).mean())
 
 
 def squared_slopes(h: xr.DataArray, periodic: bool = False, depth: float = math.inf) -> np.ndarray:

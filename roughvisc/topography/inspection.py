@@ -13,8 +13,7 @@ import xarray as xr
 from roughvisc.topography.borders import JUMP, border_mismatch
 from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.filters import fill, gaussian_filter, level, mask_outliers
-from roughvisc.topography.grid import checked, nominal_area, spacing
-from roughvisc.topography.parameters import rms_slope
+from roughvisc.topography.grid import checked, nominal_area, rms_slope, spacing
 from roughvisc.topography.spectrum import psd
 from roughvisc.units import unit_for
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import xarray as xr
 
@@ -71,8 +69,3 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
         }
     declared = {name: {"units": units, "long_name": prose} for name, (units, prose) in PARAMETERS.items()}
     return xr.Dataset({name: ((), float(value), declared[name]) for name, value in values.items()})
-
-
-def rms_slope(h: xr.DataArray, periodic: bool = False) -> float:
-    """Return the root mean square slope, Sdq of :func:`parameters`; NaN if no three neighbouring points are present."""
-    return math.sqrt(squared_slopes(checked(h, "rms_slope", least=1), periodic).mean())
