@@ -33,9 +33,9 @@ from roughvisc.variables import STATUS_MEANINGS
 log = logging.getLogger("roughvisc")
 Array = NDArray[np.float64]
 
-#: Largest stated error, over the tolerance, of a step that is kept because of it. Among steps that are chosen by their
-#: stated errors, those with too small ones are frequent: with 1 instead of 0.5, a third more steps are kept, but 9 % of
-#: 185 random cases have a row beyond the tolerance instead of 4 %.
+#: Largest stated error, over the tolerance, of a step that is kept because its error is small. Such a choice favours
+#: steps whose stated error is too small: with 1 instead of 0.5 a third more steps are kept, but 9 % instead of 4 % of
+#: 185 random cases have a row beyond the tolerance.
 CHOSEN = 0.5
 #: Times whose squares and products stay far from overflow. [s]
 LARGEST = 1e100
@@ -375,7 +375,7 @@ def check_program(profile: Profile, program: Program, boundary: str) -> None:
     """
     if not program.segments:
         raise InputError("the program is empty: expected at least one segment")
-    # Beyond full contact the approach does not determine the pressure, unless a uniform pressure has a finite mean
+    # Beyond full contact the approach does not determine the pressure, unless a uniform pressure causes a finite mean
     # displacement. If cells are absent, the body bulges into them, and every approach has a definite force.
     can_fill = boundary != "free" and profile.all_present and not profile.kernel.transfer(0.0, 0.0) > 0
     for number, (segment, end) in enumerate(zip(program.segments, program.corners[1:], strict=True)):

@@ -156,9 +156,10 @@ class Grid:
         self.self_influence = float((self.symbol.sum(axis=0) * xp.asarray(1.0 + twice)).sum()) / math.prod(self.points)
         self.convolutions = 0
         self._transforms, self._block_transforms = transforms(self.size, xp), transforms(xp=xp)
-        #: Work array of all convolutions: new memory takes up to a third of the processor time at 2,048 squared.
+        #: Work array that all convolutions reuse. At 2,048 squared a new array for each would take up to a third of the
+        #: processor time.
         self._work: Array | None = None
-        #: Symbol of the inverse, made at its first use.
+        #: Symbol of the inverse, computed when it is first needed.
         self._inverse: Array | None = None
         #: Whether a convolution calls cuFFT, which has no plans if a side is one cell, and does not normalise.
         self._by_cufft = boundary == "periodic" and hasattr(xp, "RawKernel") and 1 not in shape

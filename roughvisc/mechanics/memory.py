@@ -127,7 +127,6 @@ class Memory:
 
     def __init__(self, series: Prony, duration: float, keeps_pressure: bool = False) -> None:
         factor = 0.5 * (1 - series.poisson)  # of the contact compliance over the shear compliance
-        self.series = series
         #: Contact compliance after a time [s], cached because few times recur often. [1/Pa]
         self.compliance = cast(Callable[[float], float], lru_cache(maxsize=64)(series.contact_compliance))
         self.glassy = factor * series.glassy
@@ -159,7 +158,7 @@ class Memory:
         self.may_ring = self.grows(duration, STIFF)
 
     def grows(self, step: float, factor: float) -> bool:
-        """Return whether the compliance grows by more than a factor within a step. [s]"""
+        """Return whether the compliance grows by more than a factor within a step of some length [s]."""
         return self.compliance(step) > factor * self.glassy
 
     def start(self, nothing: Array) -> History:
@@ -206,7 +205,7 @@ class Memory:
         return History(fields, prediction.modes, history.modes if needed else None, prediction.step)
 
     def displacement(self, history: History, left: Any = 1.0) -> Array:
-        """Return the displacement, and with ``k = 2`` the pressure that causes it.
+        """Return the displacement and, if the memory keeps it, the pressure that causes it.
 
         Parameters
         ----------

@@ -159,7 +159,7 @@ class Sliding:
         return found.astype(float) * (most * unit)
 
     def slope(self, pressure: Array, axis: int = 0) -> Array:
-        r"""Return the slope along x or y of the displacement out of phase with the pressure.
+        r"""Return the slope, along x or y, of the part of the displacement that is out of phase with the pressure.
 
         In contact the surface of the body has the slope of the profile: the force on the profile is :math:`-\int p\,
         \partial u\, \mathrm dA`. Along x it drives the profile, along y it keeps the profile on its path. The
@@ -222,9 +222,9 @@ def steady_state(
         found = xp.where(contact, pressure, 0.0)
         found *= total / float(found.sum())
 
-        # Predictor: Newton's step to the solution, which gives the error of the pressure restricted to the contact. To
-        # first order, this correction changes the force by twice its sum over the slope. If the errors are below the
-        # tolerance, an accurate step gives the stated ones.
+        # Predictor: Newton's step to the solution. It corrects the pressure, which is restricted to the contact. To
+        # first order the correction changes the force by twice the sum of the correction times the slope. If both
+        # errors are below the tolerance, a more accurate step gives the stated errors.
         right = approach - opening
         step: Array = None
         for relative in (_LOOSEST, _STATED):

@@ -45,8 +45,8 @@ STATED, STATED_SOFT = (0.6, 0.6), (1.0, 1.5)
 #: On a sphere it is a fifth, on a cone a third.
 STRAIGHT = 0.25
 #: Part of the tolerance that a pair may add to the error: usually; for bodies with hardly any instantaneous compliance;
-#: and however large the error is so far. With 0.4 one soft case in eight has a row beyond the tolerance; 0.2 mends a
-#: third to a half of them with 1.1 times the convolutions, 0.1 three in five with 1.26 times.
+#: and at least, however large the error is so far. With 0.4 one soft case in eight has a row beyond the tolerance; 0.2
+#: mends a third to a half of them with 1.1 times the convolutions, 0.1 three in five with 1.26 times.
 SHARE, SHARE_SOFT, LEAST_SHARE = 0.4, 0.2, 0.2
 #: Part of the error so far that a pair may add in any case. The error of a slide depends on the cells and may be large.
 LEAST_CHANGE = 0.1
@@ -454,10 +454,10 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         length = min(length, segment.period / PAIRS_OF_A_CYCLE)
     next_event = min(scene.next_kept(event), end)
     shortest = SHORTEST_PAIR * min(segment.duration, scene.next_kept(began) - began)
+    fixed = (scene.time_step or 0.0) * (1 + 1e-9)  # longest step, up to rounding
     refused = refused_end = math.inf
     while True:
         # The pair, the same in one step, and the pressures at these instants.
-        fixed = (scene.time_step or 0.0) * (1 + 1e-9)
         if not fixed:
             middle, last = pair_ends(fine.time, length, event, next_event)
         elif event - fine.time <= fixed and event < next_event <= event + fixed:
@@ -660,10 +660,10 @@ def error_at(scene: Scene, before: Point, fine: Point, coarse: Point, slide: Sli
     grid, (stated, of_approach) = scene.grid, scene.stated
     pressure = stated * (float(abs(fine.pressure - coarse.pressure).sum()) * grid.cell_area)
     approach = of_approach * abs(fine.approach - coarse.approach)
-    force, rubbed = stated * abs(fine.force - coarse.force), 0.0
+    force, of_friction = stated * abs(fine.force - coarse.force), 0.0
     if slide is not None:
-        rubbed = abs(friction(scene, fine, slide) - friction(scene, coarse, slide))
-    apart = Difference(pressure, force, approach, friction=rubbed)
+        of_friction = abs(friction(scene, fine, slide) - friction(scene, coarse, slide))
+    apart = Difference(pressure, force, approach, friction=of_friction)
     if not scene.keeps(fine.time) or fine.force == coarse.force == 0:
         return apart
     gap = scene.gap + scene.memory.displacement(fine.history)[0] - fine.approach
@@ -676,7 +676,7 @@ def error_at(scene: Scene, before: Point, fine: Point, coarse: Point, slide: Sli
     if cells and scene.memory.grows(fine.time - before.time, SOFT):
         jumps = entering(scene, before, fine) + ENTERING * float(outside.sum()) * fine.force / cells
     uncertain = grid.cell_area * float(inside.sum()), grid.cell_area * float(outside.sum())
-    return Difference(pressure + jumps, force, approach, *uncertain, rubbed)
+    return Difference(pressure + jumps, force, approach, *uncertain, of_friction)
 
 
 def entering(scene: Scene, before: Point, after: Point) -> float:

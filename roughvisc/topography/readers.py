@@ -40,7 +40,8 @@ _NO_DATA, _REPEATED, _FAR = 999.0, 4, 10.0
 _READER = threading.RLock()
 #: Largest distance of a point from its lattice, in steps, and deviation of the axes of the lattice from x and y [rad].
 _OFF = 0.01
-#: Largest gap within a line of the lattice, over the gap between lines; and largest number of nodes per point.
+#: Largest distance between points of one line of the lattice, over the distance between lines; and largest number of
+#: nodes per point.
 _WITHIN, _SPARSE = 0.1, 64
 
 
