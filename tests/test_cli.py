@@ -44,7 +44,7 @@ def test_run__writes_result_and_figures_and_sums_up(invoke, tmp_path, coarse_pic
     assert f"Result: results/ball/{result.name}\n" in out
     assert out.endswith("2 figures: results/ball\n")
     shown = {line[:30].strip(): line[30:].strip() for line in out.splitlines()}
-    found = [shown[name].partition(";")[0] for name in ("Grid", "Force at the end", "Contact area at the end")]
+    found = [shown["Grid"], shown["Force at the end"], shown["Contact area at the end"].partition(";")[0]]
     assert found == ["24 x 21 cells, free boundary", "0 N", "0 m²"]
     with rv.open_result(result) as ds:
         assert shown["Accuracy: worst grid error"] == f"{float(ds.grid_error.max()):.2g} of the pressure"
