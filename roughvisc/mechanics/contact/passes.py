@@ -37,8 +37,10 @@ class Free(NamedTuple):
         Sum of the pressure, and its largest value.
     least, most : float
         Smallest and largest separation; the approach and zero without free cells.
-    weighted, energy : float
-        Sum of pressure times separation, and of pressure times displacement.
+    weighted : float
+        Sum of pressure times separation.
+    energy : callable
+        Computes the sum of pressure times displacement.
     """
 
     held: Array
@@ -49,7 +51,7 @@ class Free(NamedTuple):
     least: float
     most: float
     weighted: float
-    energy: float
+    energy: Callable[[], float]
 
 
 def free_cells(
@@ -70,32 +72,36 @@ def free_cells(
     present : array of bool, shape (nx ny,), or None
         Cells with material; None: all.
     """
-    contact = cells[pressure[cells] > 0]
-    level = float(separation[contact].sum()) / contact.size if under_load else level
+    touches = pressure > 0
+    contact = namespace(touches).flatnonzero(touches)
+    level = float(separation.take(contact).sum()) / contact.size if under_load else level
     free = separation < level
     if present is not None:
         free &= present
-    free[contact] = True
+    free |= touches
     return namespace(free).flatnonzero(free), level, contact.size
 
 
 def measure(pressure: Array, separation: Array, gap: Array, cells: Array, level: float, under_load: bool) -> Free:
     """Return pressure and residual at the free cells; under a load the residual has no mean."""
-    held, at = pressure[cells], separation[cells]
+    held, at = pressure.take(cells), separation.take(cells)
     residual = at - level
     if not cells.size:
-        return Free(held, residual, 0.0, 0.0, 0.0, level, 0.0, 0.0, 0.0)
-    if under_load:
-        residual -= residual.sum() / cells.size
-    weighted = inner(held, at)
-    energy = max(weighted - inner(held, gap[cells]), 0.0)
-    size, highest, least, most = map(float, (abs(residual).max(), held.max(), at.min(), at.max()))
+        return Free(held, residual, 0.0, 0.0, 0.0, level, 0.0, 0.0, float)
+    mean = float(residual.sum()) / cells.size if under_load else 0.0
+    residual -= mean
+    highest, least, most = float(held.max()), float(at.min()), float(at.max())
+    size, weighted = max(most - level - mean, mean - (least - level)), inner(held, at)
+
+    def energy() -> float:
+        return max(weighted - inner(held, gap.take(cells)), 0.0)
+
     return Free(held, residual, size, float(held.sum()), highest, least, most, weighted, energy)
 
 
 def taken(field: Array, cells: Array, factor: float) -> Array:
     """Return the values of a field at given cells, multiplied by a factor, in double precision."""
-    values = field.reshape(-1)[cells].astype(float)
+    values = field.reshape(-1).take(cells).astype(float)
     values *= factor
     return values
 
@@ -125,8 +131,8 @@ def conjugate(
     size = float(abs(direction).sum())
     if last is not None:
         old_cells, old_change, response, curvature = last
-        beta = inner(direction, response[cells]) / curvature
-        former = on_grid(old_change, old_cells).reshape(-1)[cells]
+        beta = inner(direction, response.take(cells)) / curvature
+        former = on_grid(old_change, old_cells).reshape(-1).take(cells)
         if under_load:
             former -= former.sum() / former.size
         turned = direction - beta * former
@@ -170,7 +176,7 @@ def line_search(
     cells : array of int, shape (n,)
         The free cells.
     """
-    curvature = inner(change, response[cells])
+    curvature = inner(change, response.take(cells))
     minimum = min(-slope / curvature, LONGEST_STEP) if curvature > 0 else LONGEST_STEP
     if bool(((held > 0) & (trial == 0)).any()):
         return curvature, minimum, 1.0 if minimum > 0.5 else minimum
@@ -184,17 +190,18 @@ class Scatter:
     """Field of zeros that receives the values of some cells."""
 
     def __init__(self, zeros: Array) -> None:
-        self.zeros, self.flat, self.cells = zeros, zeros.reshape(-1), zeros.reshape(-1)[:0].astype(int)
+        #: Field and the values that it received last, in double and in single precision; they are not set twice.
+        self.fields = {False: (zeros, zeros), True: (zeros.astype(np.float32), zeros)}
 
     def __call__(self, values: Array, cells: Array, divisor: float | None = None) -> Array:
         """Return the field with these values, in single precision if they are divided; the next call overwrites it."""
-        if divisor is not None:
-            values = (values / divisor).astype(np.float32)
-        self.flat[self.cells] = 0
-        self.flat = self.zeros.reshape(-1).view(values.dtype)[: self.zeros.size]
-        self.flat[cells] = values
-        self.cells = cells
-        return self.flat.reshape(self.zeros.shape)
+        is_single = divisor is not None
+        field, last = self.fields[is_single]
+        if values is not last:
+            field[...] = 0
+            field.reshape(-1)[cells] = (values / divisor).astype(np.float32) if is_single else values
+            self.fields[is_single] = field, values
+        return field
 
 
 def block_sums(grid: Grid, cells: Array, block: Array, on_grid: Scatter) -> Callable[[Array], Array]:
