@@ -32,15 +32,12 @@ import numpy as np
 from roughvisc.mechanics.body import Body, wave_limits
 from roughvisc.mechanics.grid import Grid, namespace
 from roughvisc.mechanics.layer import LayeredBody, LayerSeries, layer_series
-from roughvisc.mechanics.materials.creep import Material, Prony, one_less_mean_decay
+from roughvisc.mechanics.materials.creep import Material, Prony, parts_of_step
 from roughvisc.mechanics.materials.series import series
 
 Array = Any  # an array of NumPy or CuPy
 Rule = Literal["linear", "bdf2", "constant"]
 
-#: Orders of the series of ``(1 - (1 + x) exp(-x)) / x``, and its coefficients.
-_ORDERS = np.arange(2.0, 16)
-_COEFFICIENTS = (-1) ** _ORDERS * (_ORDERS - 1) / np.cumprod(_ORDERS)
 #: BDF2 is used if the compliance grows by more than this factor within a step.
 STIFF = 3.0
 #: BDF2 is stable while steps grow by no more than 1 + sqrt(2) [1]_; after a faster growth it restarts.
@@ -260,13 +257,8 @@ class Memory:
         """
         ratio, flows, none = step / self.times, np.isinf(self.times), np.zeros(self.times.size)
         if rule == "linear":
-            own = np.exp(-ratio)
-            new = np.where(flows, step / 2, one_less_mean_decay(ratio))
-            before = np.where(flows, step / 2, -np.expm1(-ratio) - new)
-            small = ratio < 0.3  # the difference cancels
-            early = ratio[small & ~flows, None] ** (_ORDERS - 1)
-            before[small & ~flows] = (_COEFFICIENTS * early).sum(axis=-1)
-            return own, none, before, new
+            before, new = (np.where(flows, step / 2, part) for part in parts_of_step(ratio))
+            return np.exp(-ratio), none, before, new
         if rule == "constant":
             return np.exp(-ratio), none, none, np.where(flows, step, -np.expm1(-ratio))
         growth = step / last
