@@ -127,19 +127,17 @@ class HalfSpace(Kernel):
         """
         longer = max(spacing)
         dx, dy = spacing[0] / longer, spacing[1] / longer  # unit neutrality: all lengths in longer sides
-        x = np.arange(shape[0], dtype=float)[:, None] * dx
-        y = np.arange(shape[1], dtype=float)[None, :] * dy
-        distance = np.hypot(x, y)
-        kernel = np.empty(shape)
+        x, y = np.meshgrid(np.arange(shape[0]) * dx, np.arange(shape[1]) * dy, indexing="ij", copy=False)
+        distance, kernel = np.hypot(x, y), np.empty(shape)
+        half = x >= y if dx == dy and shape[0] == shape[1] else np.ones(shape, bool)  # a square grid is symmetric
 
-        near = distance <= _GAUSS[0][0]
-        rows, columns = np.nonzero(near)
-        kernel[near] = corner_sum(x[rows, 0], y[0, columns], dx, dy)
+        near = half & (distance <= _GAUSS[0][0])
+        kernel[near] = corner_sum(x[near], y[near], dx, dy)
         for start, end, points in _GAUSS:
-            ring = (distance > start) & (distance <= end)
-            rows, columns = np.nonzero(ring)
-            mean = cell_mean(np.reciprocal, x[rows, 0], y[0, columns], (dx, dy), (points, points))
-            kernel[ring] = mean * (dx * dy)
+            ring = half & (distance > start) & (distance <= end)
+            kernel[ring] = cell_mean(np.reciprocal, x[ring], y[ring], (dx, dy), (points, points)) * (dx * dy)
+        if not half.all():
+            kernel = np.where(half, kernel, kernel.T)
         return kernel * (longer / math.pi)
 
     def transfer(self, qx: ArrayLike, qy: ArrayLike) -> Array:
