@@ -33,7 +33,7 @@ ESTIMATED_ON, ESTIMATE_TOLERANCE = 64, 1e-2
 #: because the estimate and the end of a step have errors.
 MARGIN, BEYOND = 1.2, 1.05
 #: Cells around the domain.
-RIM = 2
+RIM = 1
 #: Least number of cells along the shorter side for which a smaller domain pays, and its largest part of all cells.
 WORTH_CROPPING, LARGEST_PART = 48, 0.8
 #: Factor by which the surface of an indenter grows; and, after contact has outgrown its domain, the factor of the

@@ -90,12 +90,14 @@ def checked(h: Any, step: str, least: int = 2) -> xr.DataArray:
     h = h.transpose("x", "y").compute()
     h = h.copy(deep=False, data=in_metres(h, f"{step}: the height")).assign_attrs(units="m")
     spacing(h, step)
+    centres = {}
     for axis in ("x", "y"):
-        centres = in_metres(h[axis], f"{step}: coordinate {axis!r}")
-        h = h.assign_coords({axis: (axis, centres, h[axis].attrs | {"units": "m"})})
         if h.sizes[axis] < least:
             raise InputError(f"{step}: coordinate {axis!r} has {h.sizes[axis]} point(s): expected at least {least}")
-    return h
+        at = h[axis]
+        if at.dtype != float or at.attrs.get("units") != "m":
+            centres[axis] = axis, in_metres(at, f"{step}: coordinate {axis!r}"), at.attrs | {"units": "m"}
+    return h.assign_coords(centres) if centres else h  # slow even if there are none
 
 
 def in_metres(numbers: Any, name: str) -> np.ndarray:
