@@ -31,8 +31,8 @@ from roughvisc.mechanics.program import Program, Segment, Slide, instant
 from roughvisc.mechanics.tangential import tangential_force
 
 Array = Any  # an array of NumPy or CuPy
-#: Pressure [Pa], and its displacement per unit compliance, which is not used if the kernel depends on the step. [m Pa]
-Guess = tuple[Array, Array]
+#: Fine solution at the end of a step, and the coarse and the fine solution before it.
+Guess = tuple["Point", "Point", "Point"]
 
 #: Length of the first pair after an event, as a part of the segment: contact changes fast after a corner.
 FIRST_PAIR = 0.005
@@ -408,7 +408,7 @@ def single_step(scene: Scene, state: State, time: float) -> Step:
     new = other = take_step(scene, fine, time, number, rule="linear")
     if coarse is not fine:
         rule: Rule | None = "linear" if coarse.force == 0 else None
-        other = take_step(scene, coarse, time, number, guess=moved(new, coarse, fine), rule=rule)
+        other = take_step(scene, coarse, time, number, guess=(new, coarse, fine), rule=rule)
     apart = error_at(scene, fine, new, other, scene.motions[number])
     apart = replace(apart, shared=state.difference.shared * scene.memory.remaining(time - fine.time))
     reached, twice = new, other
@@ -468,7 +468,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         is_soft, lands = memory.grows(taken, SOFT), scene.keeps(last) or middle == event
         first, half = step_of_pair(scene, fine, middle, number, is_soft)
         second, whole = step_of_pair(scene, first, last, number, is_soft)
-        once, other = step_of_pair(scene, coarse, last, number, is_soft, moved(second, coarse, fine))
+        once, other = step_of_pair(scene, coarse, last, number, is_soft, (second, coarse, fine))
 
         # Error at the end; errors due to cells that have just entered, in the middle and shared by both solutions.
         slide = scene.motions[number] if scene.keeps(last) or scene.keeps(middle) else None
@@ -552,11 +552,11 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     points, works = [fine], [0.0]
     for number in range(1, count + 1):
         here, time = points[-1], instant(began, end, taken + number, cells)
-        points.append(over(here, 1, time, (here.pressure, here.history.fields[0])))
+        points.append(over(here, 1, time, (here, here, here)))
         works.append(works[-1] + work_of_step(scene, here, points[-1], slides=True))
     once = last = points[-1]
     if coarse is not fine or count == 2:
-        once = over(coarse, count, last.time, moved(last, coarse, fine))
+        once = over(coarse, count, last.time, (last, coarse, fine))
     apart = error_at(scene, fine, last, once, slide)
     if count == 1:  # the coarse solution takes the same step
         apart = apart.or_larger(state.difference)
@@ -813,8 +813,8 @@ def take_step(
         Index of the segment.
     value : float, optional
         Load or approach at the end. Default: the prescribed value of the segment. [N or m]
-    guess : tuple, optional
-        First guess of the pressure and of its displacement per unit compliance. Default: extrapolation.
+    guess : tuple of Point, optional
+        Points of the first guess, see :func:`first_guess`. Default: extrapolation.
     rule : {"linear", "bdf2", "constant"}, optional
         Rule of the memory.
     share : float
@@ -838,16 +838,17 @@ def take_step(
         nothing = grid.xp.zeros(gap.shape)
         history = memory.advance(here.history, prediction, nothing, nothing)
         return Point(time, nothing, 0.0, lowest if by_load else value, history, before, here.start)
-    pressure, unit = guess or (here.pressure, common)
+    pressure, unit = first_guess(*guess) if guess else (here.pressure, common)
     if guess is None and here.before is not None and step > 0:
         # Extrapolate from the last two points.
         then, former, former_unit = here.before
         ratio = step / (here.time - then)
         pressure = pressure + ratio * (pressure - former)
         unit = None if unit is None or pressure.min() < 0 else unit + ratio * (unit - former_unit)
-    guess = None  # frees its memory while the contact is solved
-    known = alpha * unit if prediction.grid is None and unit is not None else None
-    start = {"start": alpha * pressure, "start_displacement": known}
+    start = dict[str, Any]()
+    if guess or here.force > 0:
+        known = alpha * unit if prediction.grid is None and unit is not None else None
+        start = {"start": alpha * pressure, "start_displacement": known}
     del pressure, unit
     given: dict[str, Any] = {"load": value * alpha / area} if by_load else {"approach": value}
     tolerance = max(SOLVER_SHARE * scene.tolerance * share, 1e-10)
@@ -868,8 +869,12 @@ def take_step(
     return Point(time, pressure, force, approach, history, before, here.start, False, *errors)
 
 
-def moved(second: Point, coarse: Point, fine: Point) -> Guess:
-    """Return a first guess of the coarse solution: the fine solution, with the difference before the pair."""
+def first_guess(second: Point, coarse: Point, fine: Point) -> tuple[Array, Array]:
+    """Return a first guess of the coarse solution: pressure, and its displacement per unit compliance. [Pa, m Pa]
+
+    It is the fine solution, with the difference before the pair. The displacement is not used if the kernel depends on
+    the step.
+    """
     unit = second.history.fields[0]
     if coarse is fine:
         return second.pressure, unit

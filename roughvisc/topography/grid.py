@@ -219,8 +219,8 @@ def squared_slopes(h: xr.DataArray, periodic: bool = False, depth: float = math.
     (dx, dy), (nx, ny) = spacing(h), h.shape
     beyond = (0, int(periodic or nx == 1)), (0, int(periodic or ny == 1))  # a strip one cell wide repeats too
     z = np.pad(h.values, beyond, mode="wrap")
-    slope_x, slope_y = (z[1:, :-1] - z[:-1, :-1]) / dx, (z[:-1, 1:] - z[:-1, :-1]) / dy
-    squares = slope_x**2 + slope_y**2
+    squares = ((z[1:, :-1] - z[:-1, :-1]) / dx) ** 2
+    squares += ((z[:-1, 1:] - z[:-1, :-1]) / dy) ** 2
     counts = np.isfinite(squares)
     if depth < math.inf:
         lowest = np.nanmax(h.values) - depth
