@@ -167,7 +167,7 @@ class Grid:
         #: Whether a convolution calls cuFFT, which has no plans if a side is one cell, and does not normalise.
         self._by_cufft = boundary == "periodic" and hasattr(xp, "RawKernel") and 1 not in shape
         self._acting = self.symbol / self.size if self._by_cufft else self.symbol
-        if xp is np and boundary != "mirror" and self.size < THREADED_FROM:
+        if xp is np and boundary != "mirror" and self.size < THREADED_FROM // 4:
             self._acting = self.symbol.astype(complex)  # NumPy would convert it in each product
 
     # ----------------------------------------------------------------------------------------- other grids and kernels

@@ -52,7 +52,7 @@ def one(side, material, boundary):
             contact = float(ds.roughvisc.steps.contact_area_counted.max()) / nominal_area(ds)
         taken = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     settings, program = case.settings, case.program.on_area(nominal_area(case.height()))
-    memory = memory_of(case.body, program, settings).memory
+    memory = memory_of(case.body, program, settings)
     stated = PROCESS + march_bytes(settings, memory, side**2, contact=contact)
     return {
         "case": f"{side} x {side}, {boundary}, {material}",
