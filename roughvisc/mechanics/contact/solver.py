@@ -246,6 +246,7 @@ def solve_contact(
             direction += (eased - waves.mean(waves.sums(direction)))[waves.block]
         # Conjugate to the step before, on the cells that are free now.
         direction, requested_size = passes.conjugate(direction, residual, previous, on_grid, cells, under_load)
+        previous = response = None  # frees the last response before the next one is computed
         caution = CAUTION if waves is None else CAUTION_WITH_BLOCKS
         requested_size, requested_duality = caution * requested_size, max(duality, 1e-300)
 
