@@ -257,8 +257,8 @@ class Memory:
         """
         ratio, flows, none = step / self.times, np.isinf(self.times), np.zeros(self.times.size)
         if rule == "linear":
-            before, new = (np.where(flows, step / 2, part) for part in parts_of_step(ratio))
-            return np.exp(-ratio), none, before, new
+            before, after = parts_of_step(ratio)
+            return np.exp(-ratio), none, np.where(flows, step / 2, before), np.where(flows, step / 2, after)
         if rule == "constant":
             return np.exp(-ratio), none, none, np.where(flows, step, -np.expm1(-ratio))
         growth = step / last

@@ -217,12 +217,11 @@ def measure(pressure: Array, separation: Array, gap: Array, cells: Array, level:
     sums = _measure(count, pressure, separation, gap, cells, held, residual)
     total, separations, weighted, undeformed, highest, most, least = sums
     if count == 0:
-        return Free(held, residual, 0.0, 0.0, 0.0, level, 0.0, 0.0, float)
+        return Free(held, residual, 0.0, 0.0, 0.0, level, 0.0, 0.0, 0.0)
     level = separations / count if under_load else level
     residual -= level
     size = max(most - level, level + least)
-    energy = max(weighted - undeformed, 0.0)
-    return Free(held, residual, size, total, max(highest, 0.0), -least, most, weighted, lambda: energy)
+    return Free(held, residual, size, total, max(highest, 0.0), -least, most, weighted, max(weighted - undeformed, 0.0))
 
 
 def taken(field: Array, cells: Array, factor: float) -> Array:

@@ -55,8 +55,8 @@ class LongWaves(NamedTuple):
     local: float
 
     @classmethod
-    def of(cls, grid: Grid, cells: Array, values: Any, on_grid: Any, passes: Any) -> LongWaves | None:
-        """Return the blocks of the free cells, with their measured values; None if they do not pay."""
+    def of(cls, grid: Grid, cells: Array, held: Array, energy: float, on_grid: Any, passes: Any) -> LongWaves | None:
+        """Return the blocks of the free cells, with their pressure and ``p.Kp``; None if they do not pay."""
         if cells.size > SPARSE * grid.size:
             return None
         xp, blocks = grid.xp, grid.coarse
@@ -66,10 +66,9 @@ class LongWaves(NamedTuple):
         whole = float(xp.where(free > 0.98 * grid.size / blocks.size, free, 0).sum())
         if (1 - whole / max(cells.size, 1)) * min(blocks.shape) < SPOTS:
             return None
-        part, loads = grid.cell_area / blocks.cell_area, sums(values.held)
+        part, loads = grid.cell_area / blocks.cell_area, sums(held)
         displaced = blocks.displacement((loads * part).reshape(blocks.shape)).reshape(-1)
         smooth, spread = passes.spot_sums(loads, displaced, free)
-        energy = values.energy()
         if not energy > smooth:
             return None
         return cls(blocks, block, sums, free, part, LOCAL_SHARE * (energy - smooth) / spread)

@@ -37,10 +37,8 @@ class Free(NamedTuple):
         Sum of the pressure, and its largest value.
     least, most : float
         Smallest and largest separation; the approach and zero without free cells.
-    weighted : float
-        Sum of pressure times separation.
-    energy : callable
-        Computes the sum of pressure times displacement.
+    weighted, energy : float
+        Sum of pressure times separation, and of pressure times displacement.
     """
 
     held: Array
@@ -51,7 +49,7 @@ class Free(NamedTuple):
     least: float
     most: float
     weighted: float
-    energy: Callable[[], float]
+    energy: float
 
 
 def free_cells(
@@ -87,15 +85,12 @@ def measure(pressure: Array, separation: Array, gap: Array, cells: Array, level:
     held, at = pressure.take(cells), separation.take(cells)
     residual = at - level
     if not cells.size:
-        return Free(held, residual, 0.0, 0.0, 0.0, level, 0.0, 0.0, float)
+        return Free(held, residual, 0.0, 0.0, 0.0, level, 0.0, 0.0, 0.0)
     mean = float(residual.sum()) / cells.size if under_load else 0.0
     residual -= mean
     highest, least, most = float(held.max()), float(at.min()), float(at.max())
     size, weighted = max(most - level - mean, mean - (least - level)), inner(held, at)
-
-    def energy() -> float:
-        return max(weighted - inner(held, gap.take(cells)), 0.0)
-
+    energy = max(weighted - inner(held, gap.take(cells)), 0.0)
     return Free(held, residual, size, float(held.sum()), highest, least, most, weighted, energy)
 
 
