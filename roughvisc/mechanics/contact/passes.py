@@ -96,9 +96,7 @@ def measure(pressure: Array, separation: Array, gap: Array, cells: Array, level:
 
 def taken(field: Array, cells: Array, factor: float) -> Array:
     """Return the values of a field at given cells, multiplied by a factor, in double precision."""
-    values = field.reshape(-1).take(cells).astype(float)
-    values *= factor
-    return values
+    return namespace(field).multiply(field.reshape(-1).take(cells), factor, dtype=float)
 
 
 def conjugate(
