@@ -232,7 +232,7 @@ class Grid:
             if self.boundary == "free":
                 symbol = self.xp.asarray(periodic_symbol(self.kernel, self.shape, self.spacing))
             symbol[0, 0] = float(symbol[0, 0]) or float(symbol.max()) or self.spacing[0]
-            number = np.complex64 if np.iscomplexobj(self._acting) else np.float32
+            number = np.complex64 if self._acting.dtype == complex else np.float32
             self._inverse = (1 / symbol / (self.size if self._by_cufft else 1)).astype(number)
         return self._convolved(displacement, self._inverse, self.shape)
 
