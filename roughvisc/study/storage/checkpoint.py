@@ -62,7 +62,7 @@ class CheckpointWriter(Recorder):
         folder.mkdir(exist_ok=True)
         self._folder = folder
         self._interval, self._stop = seconds, stop
-        self._saved_rows, self._last_save = 0, time.monotonic()
+        self._is_saved, self._last_save = True, time.monotonic()
         self._ends = [0]  # first row of each file, and first row in memory
         self._waiting = 0  # size of the arrays in memory [byte]
         self._reading: tuple[int, Any] = -1, None  # the last file read stays open: rows are read in their order
@@ -84,7 +84,7 @@ class CheckpointWriter(Recorder):
             self._write_rows()
         if row.state is None:
             return
-        self.latest = Checkpoint(row.state, row.done, len(self.plain), wall_time)
+        self.latest, self._is_saved = Checkpoint(row.state, row.done, len(self.plain), wall_time), False
         if self._stop is not None and self._stop():
             raise KeyboardInterrupt
         if time.monotonic() - self._last_save >= self._interval:
@@ -121,8 +121,8 @@ class CheckpointWriter(Recorder):
                 rows += _read(self._rows_path(number))[: end - len(rows)]
             if len(rows) != ends[-1]:
                 raise ValueError(f"found {len(rows)} of {ends[-1]} rows")
-            self.latest = plain["reached"]
-            count = self._saved_rows = self.latest.rows  # rows after the state are computed again
+            self.latest, self._is_saved = plain["reached"], True
+            count = self.latest.rows  # rows after the state are computed again
             self.plain, self._ends = rows[:count], [min(end, count) for end in ends]
             log.info("%s: goes on from here", path)
         except _DAMAGED as error:
@@ -133,7 +133,7 @@ class CheckpointWriter(Recorder):
         """Delete all rows, because the run starts again."""
         super().restart()
         self._reading = -1, None
-        self.latest, self._saved_rows = Checkpoint(), 0
+        self.latest, self._is_saved = Checkpoint(), True
         self._ends, self._waiting = [0], 0
         (self._folder / STATE).unlink(missing_ok=True)  # first, because it refers to the rows
         for path in self._folder.iterdir():
@@ -141,12 +141,12 @@ class CheckpointWriter(Recorder):
 
     def save(self) -> None:
         """Write a checkpoint, if anything has been computed since the last one."""
-        if self.latest.rows == self._saved_rows:
+        if self._is_saved:
             return
         began = time.monotonic()
         self._write_rows()  # before the state, which refers to the rows
         _write(self._folder / STATE, {"ends": self._ends, "reached": self.latest}, {})
-        self._saved_rows, self._last_save = self.latest.rows, time.monotonic()
+        self._is_saved, self._last_save = True, time.monotonic()
         self._interval = max(self._interval, (self._last_save - began) / _SHARE)
 
     def remove(self) -> None:
