@@ -34,7 +34,7 @@ log = logging.getLogger("roughvisc")
 Array = NDArray[np.float64]
 
 #: Largest stated error, over the tolerance, of a step that is kept because its error is small. Such a choice favours
-#: steps whose stated error is too small: with 1 instead of 0.5 a third more steps are kept, but 9 % instead of 4 % of
+#: steps whose stated error is too small. With 1 instead of 0.5, a third more steps are kept, but 9 instead of 4 % of
 #: 185 random cases have a row beyond the tolerance.
 CHOSEN = 0.5
 #: Times whose squares and products stay far from overflow. [s]

@@ -168,7 +168,8 @@ class Grid:
         self._by_cufft = boundary == "periodic" and hasattr(xp, "RawKernel") and 1 not in shape
         self._acting = self.symbol / self.size if self._by_cufft else self.symbol
         if xp is np and boundary != "mirror" and self.size < THREADED_FROM // 4:
-            self._acting = self.symbol.astype(complex)  # NumPy would convert it in each product
+            # NumPy would convert it in each product; a larger one would take too much memory
+            self._acting = self.symbol.astype(complex)
 
     # ----------------------------------------------------------------------------------------- other grids and kernels
 

@@ -31,7 +31,7 @@ from roughvisc.mechanics.program import Program, Segment, Slide, instant
 from roughvisc.mechanics.tangential import tangential_force
 
 Array = Any  # an array of NumPy or CuPy
-#: Fine solution at the end of a step, and the coarse and the fine solution before it.
+#: Arguments of :func:`first_guess`.
 Guess = tuple["Point", "Point", "Point"]
 
 #: Length of the first pair after an event, as a part of the segment: contact changes fast after a corner.
@@ -45,8 +45,9 @@ STATED, STATED_SOFT = (0.6, 0.6), (1.0, 1.5)
 #: On a sphere it is a fifth, on a cone a third.
 STRAIGHT = 0.25
 #: Part of the tolerance that a pair may add to the error: usually; for bodies with hardly any instantaneous compliance;
-#: and at least, however large the error is so far. With 0.4 one soft case in eight has a row beyond the tolerance; 0.2
-#: mends a third to a half of them with 1.1 times the convolutions, 0.1 three in five with 1.26 times.
+#: and at least, however large the error is so far. With 0.4, one in eight cases of such bodies has a row beyond the
+#: tolerance. With 0.2 a third to a half of these cases are within it, for 1.1 times the convolutions; with 0.1 three in
+#: five, for 1.26 times.
 SHARE, SHARE_SOFT, LEAST_SHARE = 0.4, 0.2, 0.2
 #: Part of the error so far that a pair may add in any case. The error of a slide depends on the cells and may be large.
 LEAST_CHANGE = 0.1
@@ -846,7 +847,7 @@ def take_step(
         pressure = pressure + ratio * (pressure - former)
         unit = None if unit is None or pressure.min() < 0 else unit + ratio * (unit - former_unit)
     start = dict[str, Any]()
-    if guess or here.force > 0:
+    if guess or here.force > 0:  # otherwise the first guess would be zero
         known = alpha * unit if prediction.grid is None and unit is not None else None
         start = {"start": alpha * pressure, "start_displacement": known}
     del pressure, unit
@@ -872,8 +873,8 @@ def take_step(
 def first_guess(second: Point, coarse: Point, fine: Point) -> tuple[Array, Array]:
     """Return a first guess of the coarse solution: pressure, and its displacement per unit compliance. [Pa, m Pa]
 
-    It is the fine solution, with the difference before the pair. The displacement is not used if the kernel depends on
-    the step.
+    It is the fine solution at the end of the step, plus the difference between both solutions before the step. Three
+    equal points give the solution of this point. The displacement is not used if the kernel depends on the step.
     """
     unit = second.history.fields[0]
     if coarse is fine:

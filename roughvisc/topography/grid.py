@@ -97,7 +97,7 @@ def checked(h: Any, step: str, least: int = 2) -> xr.DataArray:
         at = h[axis]
         if at.dtype != float or at.attrs.get("units") != "m":
             centres[axis] = axis, in_metres(at, f"{step}: coordinate {axis!r}"), at.attrs | {"units": "m"}
-    return h.assign_coords(centres) if centres else h  # slow even if there are none
+    return h.assign_coords(centres)
 
 
 def in_metres(numbers: Any, name: str) -> np.ndarray:

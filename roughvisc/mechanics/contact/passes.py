@@ -62,7 +62,7 @@ def free_cells(
     pressure, separation : array, shape (nx ny,)
         Pressure, and separation at zero approach.
     cells : array of int
-        Cells that contain the contact.
+        Cells that contain the contact; only the kernels of a GPU use them.
     level : float
         Approach if it is given.
     under_load : bool
@@ -183,7 +183,7 @@ class Scatter:
     """Field of zeros that receives the values of some cells."""
 
     def __init__(self, zeros: Array) -> None:
-        #: Field and the values that it received last, in double and in single precision; they are not set twice.
+        #: Field and its present values, in double and in single precision. The same values are not set again.
         self.fields = {False: (zeros, zeros), True: (zeros.astype(np.float32), zeros)}
 
     def __call__(self, values: Array, cells: Array, divisor: float | None = None) -> Array:

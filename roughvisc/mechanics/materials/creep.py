@@ -139,7 +139,7 @@ def known_times(t: ArrayLike, longest: float) -> Array:
 
 
 def parts_of_step(x: ArrayLike) -> tuple[Array, Array]:
-    """Return the parts of ``1 - exp(-x)``, the response to a linear input: to its value before the step, and after it.
+    """Return the weights of the input before and after a step in the response of an exponential to a linear input.
 
     Parameters
     ----------
@@ -149,7 +149,8 @@ def parts_of_step(x: ArrayLike) -> tuple[Array, Array]:
     Returns
     -------
     before, after : ndarray
-        ``(1 - (1 + x) exp(-x)) / x`` and ``1 - (1 - exp(-x)) / x``; relative error below 2e-14.
+        ``(1 - (1 + x) exp(-x)) / x`` and ``1 - (1 - exp(-x)) / x``, with the sum ``1 - exp(-x)``; relative error below
+        2e-14.
     """
     x = np.asarray(x, dtype=float)
     least = np.maximum(x, 1e-17)
