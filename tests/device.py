@@ -92,7 +92,8 @@ class DeviceArray(np.lib.mixins.NDArrayOperatorsMixin):
     )
 
 
-for name in ("all", "any", "astype", "copy", "max", "mean", "min", "reshape", "sum", "take", "tolist", "view"):
+METHODS = ("all", "any", "astype", "copy", "max", "mean", "min", "nonzero", "reshape", "sum", "take", "tolist", "view")
+for name in METHODS:
     setattr(DeviceArray, name, on_device(getattr(np.ndarray, name)))
     getattr(DeviceArray, name).__doc__ = None  # with examples that are not ours
 
@@ -103,12 +104,9 @@ NAMES = [
     *("pad", "ptp", "roll", "sort", "sqrt", "stack", "take", "where", "zeros", "zeros_like"),
 ]
 globals().update({name: on_device(getattr(np, name)) for name in NAMES})
-fft = SimpleNamespace(
-    **{
-        name: on_device(getattr(scipy.fft, name))
-        for name in ("rfftn", "irfftn", "rfft", "irfft", "fft", "ifft", "dctn", "idctn")
-    }
-)
+fft = SimpleNamespace()
+for name in ("rfftn", "irfftn", "rfft", "irfft", "fft", "ifft", "dctn", "idctn"):
+    setattr(fft, name, on_device(getattr(scipy.fft, name)))
 
 
 #: One device with 8 GiB, all of it free.

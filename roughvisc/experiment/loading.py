@@ -216,6 +216,7 @@ class LoadingRows(Rows):
             if kept or (not every and (by_load or not scene.memory.grows(length, SOFT))):
                 values, fields = self._row(step, length, stated, kept)
             yield Row(point.time, values, fields, kept, self.state if step.is_end else None, point.time)
+            del fields  # frees their memory while the next step is computed
 
     def _reach_border(self, time: float) -> None:
         """Record that contact reaches the border of a free surface, enlarge an indenter, or refuse the contact."""
@@ -281,12 +282,12 @@ class LoadingRows(Rows):
         }
         slide = scene.motions[step.segment]
         if slide is not None:
-            friction = tangential_force(grid, point.pressure, displaced[0], slide)
+            friction = tangential_force(grid, pressure, displaced[0], slide)
             row |= {
                 "sliding_distance": step.state.distance,
                 "friction_force": friction,
                 "friction_coefficient": friction / point.force if point.force > 0 else math.nan,
-                "friction_force_across": tangential_force(grid, point.pressure, displaced[0], slide, across=True),
+                "friction_force_across": tangential_force(grid, pressure, displaced[0], slide, across=True),
                 "friction_force_error": step.difference.friction,
             }
         if not kept:

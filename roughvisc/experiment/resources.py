@@ -17,7 +17,7 @@ from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.grid import arrays_of
 from roughvisc.mechanics.memory import LayerMemory, Memory
 from roughvisc.mechanics.program import Program
-from roughvisc.mechanics.stepping import SOFT
+from roughvisc.mechanics.stepping import PACKED_FROM, SOFT
 from roughvisc.settings import Settings
 from roughvisc.topography.grid import counts
 from roughvisc.units import format_quantity
@@ -75,13 +75,13 @@ def memory_available(device: str = "cpu") -> Available:
 #: Fields of a surface in a run (heights, gaps and the mask of present cells), and of one that is generated or read.
 _SURFACE, _MADE = 2.1, 4.0
 #: Fields of a contact problem and its time step, and additional fields for contact on all cells.
-_SOLVE, _IN_CONTACT = 8.0, 12.0
+_SOLVE, _IN_CONTACT = 8.4, 12.0
 #: Fields of operator and spectrum, and of both on the whole surface if the domain is smaller.
 _TRANSFORMS, _WHOLE = {"periodic": 1.5, "mirror": 1.5, "free": 6.0}, 6.0
 #: Number of solutions (pressure and displacement) and number of copies of each exponential at the peak. First without
 #: memory; then for a pair of steps with its coarse solution and first guesses; last for a pair of soft steps, with the
 #: ends of its steps and the exponentials of the step before.
-_ELASTIC, _PAIR, _SOFT_PAIR = (3, 0), (5, 4), (7, 9)
+_ELASTIC, _PAIR, _SOFT_PAIR = (2, 0), (5, 5), (7, 9)
 #: Fields of an exponential if the compliances depend on the wave: a spectrum, padded in free space.
 _SPECTRUM = {"periodic": 1.1, "mirror": 1.1, "free": 4.2}
 #: Fields of a friction curve, measured at 256 x 250: operators, Newton's steps, the vectors of GMRES that are in use; a
@@ -127,7 +127,8 @@ def march_bytes(
     crept = memory.glassy + float(memory.compliances[np.isfinite(memory.times)].sum())
     solutions, copies = _ELASTIC if memory.is_elastic else _SOFT_PAIR if crept >= SOFT * memory.glassy else _PAIR
     solved = _SOLVE + _TRANSFORMS[settings.boundary] + _IN_CONTACT * contact
-    solved += solutions * (1 + kept) + copies * kept * exponentials
+    is_packed = part * cells >= PACKED_FROM and contact < 0.5  # with 12 bytes for each cell in contact
+    solved += solutions * ((1.5 * contact if is_packed else 1.0) + kept) + copies * kept * exponentials
     if layered:
         solved += 0.5 * kept * (exponentials + 1)  # symbols
     frames, surface = rows * len(settings.fields), _SURFACE + (_WHOLE if part < 1 else 0.0)

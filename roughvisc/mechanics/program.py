@@ -381,12 +381,7 @@ class Program:
 
     @classmethod
     def cycle(
-        cls,
-        mean: float | str,
-        amplitude: float | str,
-        period: float | str,
-        cycles: float,
-        control: Control = "load",
+        cls, mean: float | str, amplitude: float | str, period: float | str, cycles: float, control: Control = "load"
     ) -> Program:
         """Apply a sine wave about a mean, after a jump to the mean.
 
@@ -495,8 +490,7 @@ class Program:
     @cached_property
     def largest_load(self) -> float:
         """Largest load prescribed anywhere; zero if none is. A nominal pressure has no load without an area. [N]"""
-        loads = (segment for segment in self.segments if segment.control == "load")
-        return max([0.0, *((one.end or 0.0) + abs(one.amplitude) for one in loads)])
+        return max([0.0, *((one.end or 0.0) + abs(one.amplitude) for one in self.segments if one.control == "load")])
 
     @cached_property
     def time_scale(self) -> float:

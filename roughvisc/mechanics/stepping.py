@@ -25,7 +25,7 @@ import numpy as np
 
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.mechanics.contact.solver import solve_contact
-from roughvisc.mechanics.grid import Grid
+from roughvisc.mechanics.grid import Grid, namespace
 from roughvisc.mechanics.memory import STIFF, History, Memory, Rule
 from roughvisc.mechanics.program import Program, Segment, Slide, instant
 from roughvisc.mechanics.tangential import tangential_force
@@ -34,6 +34,8 @@ Array = Any  # an array of NumPy or CuPy
 #: Arguments of :func:`first_guess`.
 Guess = tuple["Point", "Point", "Point"]
 
+#: Number of cells from which a point stores the pressure of the cells in contact only, if less than half are.
+PACKED_FROM = 1024**2
 #: Length of the first pair after an event, as a part of the segment: contact changes fast after a corner.
 FIRST_PAIR = 0.005
 #: Part of the difference between the fine and the coarse solution that is stated as the error, of pressure and force,
@@ -186,14 +188,14 @@ class Point:
     ----------
     time : float
         Time. [s]
-    pressure : array, shape (nx, ny)
-        Pressure. [Pa]
+    pressed : array or tuple
+        Pressure, shape (nx, ny) [Pa]; or the shape, the cells in contact as flat indices, and their pressure.
     force, approach : float
         Normal force and approach. [N, m]
     history : History
         Memory of the body.
     before : tuple or None
-        Time, pressure and displacement per unit compliance of the last point, from which the next step extrapolates.
+        Time, `pressed`, and displacement per unit compliance of the last point, from which the next step extrapolates.
     start : float
         Force [N] or approach [m] at the start of the segment, if the program does not state it.
     is_late : bool
@@ -203,15 +205,23 @@ class Point:
     """
 
     time: float
-    pressure: Array
+    pressed: Any
     force: float
     approach: float
     history: History
-    before: tuple[float, Array, Array | None] | None = None
+    before: tuple[float, Any, Array | None] | None = None
     start: float = 0.0
     is_late: bool = False
     solver_error: float = 0.0
     solver_error_approach: float = 0.0
+
+    @property
+    def pressure(self) -> Array:
+        """Pressure of all cells, shape (nx, ny). [Pa]"""
+        if isinstance(self.pressed, tuple):
+            shape, cells, values = self.pressed
+            return namespace(values).bincount(cells, values, math.prod(shape)).reshape(shape)
+        return self.pressed
 
 
 @dataclass(frozen=True)
@@ -547,7 +557,7 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     def over(here: Point, number: int, time: float, guess: Guess) -> Point:
         history = memory.roll(here.history, slide.sense * number, slide.axis)
         pressure = grid.xp.roll(here.pressure, -slide.sense * number, slide.axis)
-        body = replace(here, history=history, pressure=pressure, before=None)
+        body = replace(here, history=history, pressed=pressure, before=None)
         return take_step(scene, body, time, state.segment, guess=guess, share=SLIDING_SHARE)
 
     points, works = [fine], [0.0]
@@ -658,8 +668,8 @@ def error_at(scene: Scene, before: Point, fine: Point, coarse: Point, slide: Sli
     """
     if fine is coarse:
         return Difference()
-    grid, (stated, of_approach) = scene.grid, scene.stated
-    pressure = stated * (float(abs(fine.pressure - coarse.pressure).sum()) * grid.cell_area)
+    grid, (stated, of_approach), held, other = scene.grid, scene.stated, fine.pressure, coarse.pressure
+    pressure = stated * (float(abs(held - other).sum()) * grid.cell_area)
     approach = of_approach * abs(fine.approach - coarse.approach)
     force, of_friction = stated * abs(fine.force - coarse.force), 0.0
     if slide is not None:
@@ -669,11 +679,11 @@ def error_at(scene: Scene, before: Point, fine: Point, coarse: Point, slide: Sli
         return apart
     gap = scene.gap + scene.memory.displacement(fine.history)[0] - fine.approach
     near = scene.gap + scene.memory.displacement(coarse.history)[0] - coarse.approach
-    inside = (fine.pressure > 0) & (fine.pressure <= abs(fine.pressure - coarse.pressure))
-    outside = (fine.pressure == 0) & ((coarse.pressure > 0) | (gap <= abs(gap - near)))
+    inside = (held > 0) & (held <= abs(held - other))
+    outside = (held == 0) & ((other > 0) | (gap <= abs(gap - near)))
     if scene.present is not None:
         outside &= scene.present
-    cells, jumps = int((fine.pressure > 0).sum()), 0.0
+    cells, jumps = int((held > 0).sum()), 0.0
     if cells and scene.memory.grows(fine.time - before.time, SOFT):
         jumps = entering(scene, before, fine) + ENTERING * float(outside.sum()) * fine.force / cells
     uncertain = grid.cell_area * float(inside.sum()), grid.cell_area * float(outside.sum())
@@ -834,7 +844,7 @@ def take_step(
     gap += scene.gap
     lowest = float(gap[scene.solid].min())
     common = here.history.fields[0] if prediction.grid is None else None  # displacement per unit compliance
-    before = (here.time, here.pressure, common) if step > 0 and not here.is_late else None
+    before = (here.time, here.pressed, common) if step > 0 and not here.is_late else None
     if (value == 0) if by_load else (value <= lowest):
         nothing = grid.xp.zeros(gap.shape)
         history = memory.advance(here.history, prediction, nothing, nothing)
@@ -842,14 +852,15 @@ def take_step(
     pressure, unit = first_guess(*guess) if guess else (here.pressure, common)
     if guess is None and here.before is not None and step > 0:
         # Extrapolate from the last two points.
-        then, former, former_unit = here.before
+        then, pressed, former_unit = here.before
         ratio = step / (here.time - then)
-        pressure = pressure + ratio * (pressure - former)
+        pressure = pressure + ratio * (pressure - replace(here, pressed=pressed).pressure)
         unit = None if unit is None or pressure.min() < 0 else unit + ratio * (unit - former_unit)
     start = dict[str, Any]()
     if guess or here.force > 0:  # otherwise the first guess would be zero
-        known = alpha * unit if prediction.grid is None and unit is not None else None
-        start = {"start": alpha * pressure, "start_displacement": known}
+        pressure = alpha * pressure
+        unit = alpha * unit if prediction.grid is None and unit is not None else None
+        start = {"start": pressure, "start_displacement": unit}
     del pressure, unit
     given: dict[str, Any] = {"load": value * alpha / area} if by_load else {"approach": value}
     tolerance = max(SOLVER_SHARE * scene.tolerance * share, 1e-10)
@@ -866,8 +877,11 @@ def take_step(
     unit /= alpha
     force, approach = (value, found.approach) if by_load else (found.load / alpha * area, value)
     history = memory.advance(here.history, prediction, unit, pressure)
-    errors = found.error, found.approach_error
-    return Point(time, pressure, force, approach, history, before, here.start, False, *errors)
+    errors, pressed = (found.error, found.approach_error), pressure
+    if pressure.size >= PACKED_FROM and 2 * int((pressure > 0).sum()) < pressure.size:
+        cells = grid.xp.flatnonzero(pressure).astype(np.int32)
+        pressed = pressure.shape, cells, pressure.reshape(-1)[cells]
+    return Point(time, pressed, force, approach, history, before, here.start, False, *errors)
 
 
 def first_guess(second: Point, coarse: Point, fine: Point) -> tuple[Array, Array]:
@@ -888,9 +902,8 @@ def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> 
     here, now, began = state.fine, state.fine.time, scene.program.corners[state.segment]
     if segment.control == "load":
         return event if segment.highest(here.start) == 0 else now
-    if segment.highest(here.start) <= float(
-        scene.gap[scene.solid].min()
-    ):  # the surface recovers to its undeformed shape
+    # the surface recovers to its undeformed shape
+    if segment.highest(here.start) <= float(scene.gap[scene.solid].min()):
         return event
 
     def touching(left: float, right: float) -> float | None:

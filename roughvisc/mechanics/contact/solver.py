@@ -271,7 +271,8 @@ def solve_contact(
         # Minimize the energy along the search direction, equation (11): one convolution.
         if is_extrapolated:  # replaces the displacement of the first guess, so that rounding errors do not accumulate
             response = grid.displacement(on_grid(trial, cells)).reshape(-1)
-            response -= separation - given
+            response -= separation
+            response += given
         else:
             response = grid.displacement(on_grid(change, cells)).reshape(-1)
         curvature, minimum, fraction = passes.line_search(held, trial, change, slope, response, cells)
