@@ -60,9 +60,9 @@ def label(dataset: xr.Dataset) -> xr.Dataset:
     for name, variable in dataset.variables.items():
         if name in VARIABLES or name in dataset.data_vars:
             declared[name] = VARIABLES[str(name)]
-            if variable.dtype.kind not in "fUO":
+            if variable.dtype.kind not in "fUO" and variable.dtype != declared[name].dtype:
                 converted[name] = variable.astype(declared[name].dtype)
-    labelled = dataset.assign(converted)  # once: each assignment merges the whole
+    labelled = dataset.assign(converted) if converted else dataset.copy()  # once: each assignment merges the whole
     for name, one in declared.items():
         attributes = labelled.variables[name].attrs
         attributes.update(one.attributes)

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 from scipy import fft
@@ -180,6 +179,7 @@ def solve_on_grid(
                 recorder.append(row, experiment.axis, spent + time.perf_counter() - began)
                 if report is not None:
                     report(row.done, rows.end)
+                del row  # frees its memory while the next one is computed
             return dataset_of(experiment, rows, recorder)
         except Outgrown as outgrown:
             log.info("contact has outgrown its domain: the run begins again on a larger one")
@@ -205,21 +205,25 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
         Over the axis of the experiment, not labelled yet.
     """
     height, settings, axis = rows.problem.height, rows.problem.settings, experiment.axis
-    steps = pd.DataFrame(recorder.plain)
-    kept = steps[steps["kept"]]
+    steps = recorder.plain
+    kept = [number for number, step in enumerate(steps) if step["kept"]]
     attributes: dict[str, Any] = {"highest": rows.profile.highest}
     for name in _ORIGIN:
         if name in height.attrs:
             attributes[name] = height.attrs[name]
     variables: dict[str, Any] = {"height": (("x", "y"), np.asarray(height.values, dtype=float), attributes)}
-    for name in kept.columns.drop(["kept", axis]):
-        variables[name] = axis, kept[name].to_numpy()
+    columns = {}
+    for name in steps[kept[0]]:
+        if name != "kept":
+            kind = VARIABLES[name].dtype if name in VARIABLES else float  # other columns are for finish() only
+            columns[name] = axis, np.array([steps[number][name] for number in kept], kind)
+    coordinates = {axis: columns.pop(axis), "x": height["x"].values, "y": height["y"].values}
+    variables |= columns
     for name in settings.fields:
-        found = recorder.field(name, kept.index.tolist(), (height.shape[0], height.shape[1]))
+        found = recorder.field(name, kept, (height.shape[0], height.shape[1]))
         variables[name] = (axis, "x", "y"), found
     if "filled" in height.coords:
         variables["filled"] = ("x", "y"), height["filled"].values
-    coordinates = {axis: kept[axis].to_numpy(), "x": height["x"].values, "y": height["y"].values}
     made = {"Conventions": "CF-1.11", "boundary": settings.boundary, "tolerance": settings.tolerance}
     made["history"] = str(height.attrs.get("history", ""))
     made |= experiment.facts(rows.problem.body, height)
@@ -235,10 +239,11 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     if lines:
         dataset.attrs["warnings"] = "\n".join(lines)
     if axis == "time":
-        steps["convolutions"] = np.diff(steps["convolutions"], prepend=0)
         every = {}
         for name in ("time", *STEPPED):
-            if name in steps:
-                every[name] = STEP, steps[name].to_numpy()
+            if name in steps[0]:
+                values = [step[name] for step in steps]
+                values = np.diff(values, prepend=0) if name == "convolutions" else values
+                every[name] = STEP, np.array(values, VARIABLES[name].dtype)
         dataset.encoding[CARRIED] = label(xr.Dataset(every, attrs={"title": TITLE}).set_coords("time"))
     return dataset

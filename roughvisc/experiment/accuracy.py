@@ -18,7 +18,7 @@ from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import SHORTEST_PAIR, Scene, Step
 from roughvisc.settings import Settings, kept_times
 from roughvisc.topography.borders import JUMP, border_mismatch
-from roughvisc.topography.grid import rms_slope
+from roughvisc.topography.grid import squared_slopes
 from roughvisc.topography.recipes import indenter_of, is_analytic
 from roughvisc.units import format_quantity
 
@@ -194,7 +194,8 @@ def slope_warning(height: xr.DataArray, boundary: str, approach: float) -> str:
     approach : float
         Largest approach at kept times, from the highest cell. [m]
     """
-    slope = rms_slope(height, boundary == "periodic", approach if boundary == "free" else math.inf)
+    depth = approach if boundary == "free" else math.inf
+    slope = math.sqrt(squared_slopes(height, boundary == "periodic", depth).mean())
     if not slope > LARGEST_SLOPE:
         return ""
     return (
