@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
+from operator import itemgetter
 from typing import Any, ClassVar
 
 import numpy as np
@@ -206,21 +207,21 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     """
     height, settings, axis = rows.problem.height, rows.problem.settings, experiment.axis
     steps = recorder.plain
-    kept = [number for number, step in enumerate(steps) if step["kept"]]
+    kept, numbers = list(filter(itemgetter("kept"), steps)), np.flatnonzero(list(map(itemgetter("kept"), steps)))
     attributes: dict[str, Any] = {"highest": rows.profile.highest}
     for name in _ORIGIN:
         if name in height.attrs:
             attributes[name] = height.attrs[name]
     variables: dict[str, Any] = {"height": (("x", "y"), np.asarray(height.values, dtype=float), attributes)}
     columns = {}
-    for name in steps[kept[0]]:
+    for name in kept[0]:
         if name != "kept":
             kind = VARIABLES[name].dtype if name in VARIABLES else float  # other columns are for finish() only
-            columns[name] = axis, np.array([steps[number][name] for number in kept], kind)
+            columns[name] = axis, np.array(list(map(itemgetter(name), kept)), kind)
     coordinates = {axis: columns.pop(axis), "x": height["x"].values, "y": height["y"].values}
     variables |= columns
     for name in settings.fields:
-        found = recorder.field(name, kept, (height.shape[0], height.shape[1]))
+        found = recorder.field(name, numbers.tolist(), (height.shape[0], height.shape[1]))
         variables[name] = (axis, "x", "y"), found
     if "filled" in height.coords:
         variables["filled"] = ("x", "y"), height["filled"].values
@@ -242,7 +243,7 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
         every = {}
         for name in ("time", *STEPPED):
             if name in steps[0]:
-                values = [step[name] for step in steps]
+                values = list(map(itemgetter(name), steps))
                 values = np.diff(values, prepend=0) if name == "convolutions" else values
                 every[name] = STEP, np.array(values, VARIABLES[name].dtype)
         dataset.encoding[CARRIED] = label(xr.Dataset(every, attrs={"title": TITLE}).set_coords("time"))
