@@ -75,7 +75,7 @@ def memory_available(device: str = "cpu") -> Available:
 #: Fields of a surface in a run (heights, gaps and the mask of present cells), and of one that is generated or read.
 _SURFACE, _MADE = 2.1, 4.0
 #: Fields of a contact problem and its time step, and additional fields for contact on all cells.
-_SOLVE, _IN_CONTACT = 8.4, 12.0
+_SOLVE, _IN_CONTACT = 8.4, 13.5
 #: Fields of operator and spectrum, and of both on the whole surface if the domain is smaller.
 _TRANSFORMS, _WHOLE = {"periodic": 1.5, "mirror": 1.5, "free": 6.0}, 6.0
 #: Number of solutions (pressure and displacement) and number of copies of each exponential at the peak. First without
@@ -127,8 +127,8 @@ def march_bytes(
     crept = memory.glassy + float(memory.compliances[np.isfinite(memory.times)].sum())
     solutions, copies = _ELASTIC if memory.is_elastic else _SOFT_PAIR if crept >= SOFT * memory.glassy else _PAIR
     solved = _SOLVE + _TRANSFORMS[settings.boundary] + _IN_CONTACT * contact
-    is_packed = part * cells >= PACKED_FROM and contact < 0.5  # with 12 bytes for each cell in contact
-    solved += solutions * ((1.5 * contact if is_packed else 1.0) + kept) + copies * kept * exponentials
+    is_packed = part * cells >= PACKED_FROM and contact < 0.5  # 18 bytes for each cell in contact (measured)
+    solved += solutions * ((2.25 * contact if is_packed else 1.0) + kept) + copies * kept * exponentials
     if layered:
         solved += 0.5 * kept * (exponentials + 1)  # symbols
     frames, surface = rows * len(settings.fields), _SURFACE + (_WHOLE if part < 1 else 0.0)
