@@ -100,7 +100,7 @@ class Prony:
 
     def creep_compliance(self, t: ArrayLike) -> Array:
         """Return the shear creep compliance ``J(t)``, [1/Pa]; times beyond the longest one are refused. [s]"""
-        t = np.asarray(t, float) if self.longest == math.inf else known_times(t, self.longest)
+        t = known_times(t, self.longest)
         retarded = np.add.reduce(self.compliances * -np.expm1(-t[..., None] / np.array(self.times)), axis=-1)
         flowed = self.fluidity * t if self.fluidity else 0.0  # a solid has a limit at inf
         return np.asarray(self.glassy + flowed + retarded)

@@ -103,6 +103,8 @@ def test_creep_table__is_not_extrapolated(ask):
     ask(table, 100.0 * (1 + 1e-13))  # rounding of a sum of steps
     with pytest.raises(InputError, match=r"and the table ends at 100 s"):
         ask(table, 101.0)
+    with pytest.raises(InputError, match="creep is requested at nan s"):
+        rv.elastic(1.0).creep_compliance(np.nan)
 
 
 @pytest.mark.parametrize(("key", "found"), [("noise", -0.1), ("noise", np.nan), ("poisson", 0.6), ("kind", "bulk")])
