@@ -207,7 +207,8 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     """
     height, settings, axis = rows.problem.height, rows.problem.settings, experiment.axis
     steps = recorder.plain
-    kept, numbers = list(filter(itemgetter("kept"), steps)), np.flatnonzero(list(map(itemgetter("kept"), steps)))
+    kept = list(filter(itemgetter("kept"), steps))
+    numbers = np.flatnonzero(list(map(itemgetter("kept"), steps))).tolist()
     attributes: dict[str, Any] = {"highest": rows.profile.highest}
     for name in _ORIGIN:
         if name in height.attrs:
@@ -216,12 +217,12 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     columns = {}
     for name in kept[0]:
         if name != "kept":
-            kind = VARIABLES[name].dtype if name in VARIABLES else float  # other columns are for finish() only
+            kind = VARIABLES[name].dtype if name in VARIABLES else float  # only finish() reads the others
             columns[name] = axis, np.array(list(map(itemgetter(name), kept)), kind)
     coordinates = {axis: columns.pop(axis), "x": height["x"].values, "y": height["y"].values}
     variables |= columns
     for name in settings.fields:
-        found = recorder.field(name, numbers.tolist(), (height.shape[0], height.shape[1]))
+        found = recorder.field(name, numbers, (height.shape[0], height.shape[1]))
         variables[name] = (axis, "x", "y"), found
     if "filled" in height.coords:
         variables["filled"] = ("x", "y"), height["filled"].values

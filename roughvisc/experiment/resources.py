@@ -127,7 +127,7 @@ def march_bytes(
     crept = memory.glassy + float(memory.compliances[np.isfinite(memory.times)].sum())
     solutions, copies = _ELASTIC if memory.is_elastic else _SOFT_PAIR if crept >= SOFT * memory.glassy else _PAIR
     solved = _SOLVE + _TRANSFORMS[settings.boundary] + _IN_CONTACT * contact
-    is_packed = part * cells >= PACKED_FROM and contact < 0.5  # 18 bytes for each cell in contact (measured)
+    is_packed = part * cells >= PACKED_FROM and contact < 0.5  # a pressure takes 18 bytes per contact cell (measured)
     solved += solutions * ((2.25 * contact if is_packed else 1.0) + kept) + copies * kept * exponentials
     if layered:
         solved += 0.5 * kept * (exponentials + 1)  # symbols

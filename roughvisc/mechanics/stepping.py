@@ -34,7 +34,8 @@ Array = Any  # an array of NumPy or CuPy
 #: Arguments of :func:`first_guess`.
 Guess = tuple["Point", "Point", "Point"]
 
-#: Number of cells from which a point stores the pressure of the cells in contact only, if less than half are.
+#: A surface with at least this number of cells stores the pressure of its contact cells only, if they are less than
+#: half of all cells.
 PACKED_FROM = 1024**2
 #: Length of the first pair after an event, as a part of the segment: contact changes fast after a corner.
 FIRST_PAIR = 0.005
@@ -188,14 +189,14 @@ class Point:
     ----------
     time : float
         Time. [s]
-    pressed : array or tuple
-        Pressure, shape (nx, ny) [Pa]; or the shape, the cells in contact as flat indices, and their pressure.
+    stored_pressure : array or tuple
+        Pressure, shape (nx, ny) [Pa]; or this shape, the contact cells as flat indices, and their pressure [Pa].
     force, approach : float
         Normal force and approach. [N, m]
     history : History
         Memory of the body.
     before : tuple or None
-        Time, `pressed`, and displacement per unit compliance of the last point, from which the next step extrapolates.
+        Time, stored pressure, and displacement per unit compliance of the last point: the next step extrapolates them.
     start : float
         Force [N] or approach [m] at the start of the segment, if the program does not state it.
     is_late : bool
@@ -205,7 +206,7 @@ class Point:
     """
 
     time: float
-    pressed: Any
+    stored_pressure: Any
     force: float
     approach: float
     history: History
@@ -217,11 +218,11 @@ class Point:
 
     @property
     def pressure(self) -> Array:
-        """Pressure of all cells, shape (nx, ny). [Pa]"""
-        if isinstance(self.pressed, tuple):
-            shape, cells, values = self.pressed
+        """Pressure at all cells, shape (nx, ny). [Pa]"""
+        if isinstance(self.stored_pressure, tuple):
+            shape, cells, values = self.stored_pressure
             return namespace(values).bincount(cells, values, math.prod(shape)).reshape(shape)
-        return self.pressed
+        return self.stored_pressure
 
 
 @dataclass(frozen=True)
@@ -557,7 +558,7 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     def over(here: Point, number: int, time: float, guess: Guess) -> Point:
         history = memory.roll(here.history, slide.sense * number, slide.axis)
         pressure = grid.xp.roll(here.pressure, -slide.sense * number, slide.axis)
-        body = replace(here, history=history, pressed=pressure, before=None)
+        body = replace(here, history=history, stored_pressure=pressure, before=None)
         return take_step(scene, body, time, state.segment, guess=guess, share=SLIDING_SHARE)
 
     points, works = [fine], [0.0]
@@ -844,7 +845,7 @@ def take_step(
     gap += scene.gap
     lowest = float(gap[scene.solid].min())
     common = here.history.fields[0] if prediction.grid is None else None  # displacement per unit compliance
-    before = (here.time, here.pressed, common) if step > 0 and not here.is_late else None
+    before = (here.time, here.stored_pressure, common) if step > 0 and not here.is_late else None
     if (value == 0) if by_load else (value <= lowest):
         nothing = grid.xp.zeros(gap.shape)
         history = memory.advance(here.history, prediction, nothing, nothing)
@@ -852,9 +853,9 @@ def take_step(
     pressure, unit = first_guess(*guess) if guess else (here.pressure, common)
     if guess is None and here.before is not None and step > 0:
         # Extrapolate from the last two points.
-        then, pressed, former_unit = here.before
+        then, stored, former_unit = here.before
         ratio = step / (here.time - then)
-        pressure = pressure + ratio * (pressure - replace(here, pressed=pressed).pressure)
+        pressure = pressure + ratio * (pressure - replace(here, stored_pressure=stored).pressure)
         unit = None if unit is None or pressure.min() < 0 else unit + ratio * (unit - former_unit)
     start = dict[str, Any]()
     if guess or here.force > 0:  # otherwise the first guess would be zero
@@ -877,11 +878,11 @@ def take_step(
     unit /= alpha
     force, approach = (value, found.approach) if by_load else (found.load / alpha * area, value)
     history = memory.advance(here.history, prediction, unit, pressure)
-    errors, pressed = (found.error, found.approach_error), pressure
+    errors, stored = (found.error, found.approach_error), pressure
     if pressure.size >= PACKED_FROM and 2 * int((pressure > 0).sum()) < pressure.size:
         cells = grid.xp.flatnonzero(pressure).astype(np.int32)
-        pressed = pressure.shape, cells, pressure.reshape(-1)[cells]
-    return Point(time, pressed, force, approach, history, before, here.start, False, *errors)
+        stored = pressure.shape, cells, pressure.reshape(-1)[cells]
+    return Point(time, stored, force, approach, history, before, here.start, False, *errors)
 
 
 def first_guess(second: Point, coarse: Point, fine: Point) -> tuple[Array, Array]:
@@ -902,7 +903,7 @@ def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> 
     here, now, began = state.fine, state.fine.time, scene.program.corners[state.segment]
     if segment.control == "load":
         return event if segment.highest(here.start) == 0 else now
-    # the surface recovers to its undeformed shape
+    # the profile would not even touch the undeformed surface, which is the highest
     if segment.highest(here.start) <= float(scene.gap[scene.solid].min()):
         return event
 

@@ -64,7 +64,7 @@ SCENES = {
 
 @pytest.mark.parametrize("name", SCENES)
 def test_simulate__on_a_device_gives_what_a_cpu_gives(gpu, monkeypatch, name):
-    monkeypatch.setattr("roughvisc.mechanics.stepping.PACKED_FROM", 300)  # the pressures of most scenes
+    monkeypatch.setattr("roughvisc.mechanics.stepping.PACKED_FROM", 300)  # packs the pressures of most scenes
     height, body, program, settings = SCENES[name]
     settings = {"times": 4, "fields": ("pressure", "gap", "displacement"), "progress": False, **settings}
     found, expected = (rv.simulate(height, body, program, numerics=one, **settings) for one in (GPU, rv.Numerics()))

@@ -310,9 +310,10 @@ def block_sums(grid: Grid, cells: Array, block: Array, on_grid: Scatter) -> Call
     return sums
 
 
-def spot_sums(loads: Array, displaced: Array, free: Array) -> list[float]:
+def spot_sums(loads: Array, displaced: Array, free: Array) -> tuple[float, float]:
     """Return the sums of the loads of blocks times their displacement, and of their squares over the free cells."""
-    return _spot_sums(loads.size, loads, displaced, free)
+    along, spread = _spot_sums(loads.size, loads, displaced, free)
+    return along, spread
 
 
 def block_pressure(blocks: Grid, left: Array, free: Array, local: float, part: float) -> Array:

@@ -19,7 +19,7 @@ Array = Any  # an array of NumPy or CuPy
 Last = tuple[Array, Array, Array, float]
 #: Largest ratio of a step to its trial: the periodic kernel does not resist a uniform pressure.
 LONGEST_STEP = 30.0
-#: Number of cells of a block of a field: a product with a block stays in the cache.
+#: Number of cells that are processed at once, so that intermediate results stay in the cache.
 BLOCK = 1 << 15
 #: Reduction of the residual of the equations of the blocks, and largest number of iterations. With four instead of
 #: about eight iterations, creep on 1,024 x 1,024 cells needs 3 % more convolutions of the cells and 3 % less time.
