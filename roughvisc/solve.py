@@ -6,7 +6,7 @@ import logging
 import multiprocessing
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from operator import itemgetter
@@ -72,19 +72,19 @@ class Recorder:
     latest: Checkpoint = Checkpoint()
     plain: list[dict[str, Any]] = field(default_factory=list)
     in_memory: ClassVar[bool] = True
-    _arrays: list[Mapping[str, Array]] = field(default_factory=list)
+    _arrays: list[dict[str, Array]] = field(default_factory=list)
 
     def append(self, row: Row, axis: str, wall_time: float) -> None:
         """Record the values and fields of a row on an axis, and the wall time spent so far [s]; states are not kept."""
         if row.values:
             self.plain.append({axis: row.at, **row.values, "wall_time": wall_time, "kept": row.kept})
-            self._arrays.append(row.fields)
+            self._arrays.append(dict(row.fields))
 
     def field(self, name: str, rows: Sequence[int], shape: tuple[int, int]) -> Any:
-        """Return a field of some rows, an array (rows, x, y)."""
+        """Return a field of some rows, an array (rows, x, y). It no longer belongs to the recorder."""
         frames = np.empty((len(rows), *shape))
         for frame, row in zip(frames, rows, strict=True):
-            frame[...] = self._arrays[row][name]
+            frame[...] = self._arrays[row].pop(name)  # frees its memory
         return frames
 
     def restart(self) -> None:

@@ -302,7 +302,10 @@ class LoadingRows(Rows):
                 beyond["gap"] = np.maximum(profile.gap + beyond["displacement"] - point.approach, 0.0)
         fields = {}
         for name in names:
-            fields[name] = to_host({"pressure": pressure, "displacement": displacement, "gap": gap}[name])
+            if name == "pressure":
+                fields[name] = pressure if xp is np else point.pressure_on_host
+            else:
+                fields[name] = to_host(displacement if name == "displacement" else gap)
             if beyond:
                 beyond[name][domain.cells] = fields[name]
                 fields[name] = beyond[name]

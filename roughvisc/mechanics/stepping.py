@@ -25,7 +25,7 @@ import numpy as np
 
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.mechanics.contact.solver import solve_contact
-from roughvisc.mechanics.grid import Grid, namespace
+from roughvisc.mechanics.grid import Grid, namespace, to_host
 from roughvisc.mechanics.memory import STIFF, History, Memory, Rule
 from roughvisc.mechanics.program import Program, Segment, Slide, instant
 from roughvisc.mechanics.tangential import tangential_force
@@ -219,10 +219,20 @@ class Point:
     @property
     def pressure(self) -> Array:
         """Pressure at all cells, shape (nx, ny). [Pa]"""
-        if isinstance(self.stored_pressure, tuple):
-            shape, cells, values = self.stored_pressure
-            return namespace(values).bincount(cells, values, math.prod(shape)).reshape(shape)
-        return self.stored_pressure
+        if not isinstance(self.stored_pressure, tuple):
+            return self.stored_pressure
+        shape, cells, values = self.stored_pressure
+        field = namespace(values).zeros(math.prod(shape))
+        field[cells] = values
+        return field.reshape(shape)
+
+    @property
+    def pressure_on_host(self) -> np.ndarray:
+        """Pressure at all cells as an array of NumPy. From a device only stored values are copied. [Pa]"""
+        if not isinstance(self.stored_pressure, tuple):
+            return to_host(self.stored_pressure)
+        shape, cells, values = self.stored_pressure
+        return replace(self, stored_pressure=(shape, to_host(cells), to_host(values))).pressure
 
 
 @dataclass(frozen=True)

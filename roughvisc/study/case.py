@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 __all__ = ["Case", "read_cases", "read_study", "vary"]
 
 #: Incremented whenever the numbers of an unchanged case change.
-NUMERICS_REVISION = 54
+NUMERICS_REVISION = 55
 
 
 @cache

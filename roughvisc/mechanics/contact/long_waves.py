@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from roughvisc.mechanics.contact.passes import Free
 from roughvisc.mechanics.grid import Grid
 
 Array = Any  # an array of NumPy or CuPy, depending on the grid
 
 #: Largest part of free cells for blocks.
 SPARSE = 0.6
+#: Part of its cells from which a block is full.
+FULL = 0.98
 #: Blocks pay if the number of blocks along a side, times the part of the free cells that lies in partly free blocks, is
 #: at least this. Within a contact spot that is wider than a block, blocks slow the iteration.
 SPOTS = 45.0
@@ -31,12 +33,10 @@ class LongWaves(NamedTuple):
     ----------
     blocks : Grid
         Grid of the blocks.
-    block : array of int
-        Block of each free cell.
-    sums : callable
-        Sums values of the free cells over each block.
-    free : array
-        Number of free cells of each block.
+    place : array of int
+        Block of each free cell; on a GPU, :attr:`~roughvisc.mechanics.contact.passes.Free.ends`.
+    free, left : array
+        Number of free cells of each block, and sum of their residual.
     part : float
         Area of a cell over the area of a block.
     local : float
@@ -48,31 +48,21 @@ class LongWaves(NamedTuple):
     """
 
     blocks: Grid
-    block: Array
-    sums: Callable[[Array], Array]
+    place: Array
     free: Array
+    left: Array
     part: float
     local: float
 
     @classmethod
-    def of(cls, grid: Grid, cells: Array, held: Array, energy: float, on_grid: Any, passes: Any) -> LongWaves | None:
-        """Return the blocks of the free cells, with their pressure and ``p.Kp``; None if they do not pay."""
-        if cells.size > SPARSE * grid.size:
+    def of(cls, grid: Grid, found: Free, passes: Any) -> LongWaves | None:
+        """Return the blocks of the free cells; None if they do not pay."""
+        if found.cells.size > SPARSE * grid.size:
             return None
-        xp, blocks = grid.xp, grid.coarse
-        block = grid.block_of_cell.take(cells)
-        sums = passes.block_sums(grid, cells, block, on_grid)
-        free = sums(xp.ones(cells.size))
-        whole = float(xp.where(free > 0.98 * grid.size / blocks.size, free, 0).sum())
-        if (1 - whole / max(cells.size, 1)) * min(blocks.shape) < SPOTS:
-            return None
-        part, loads = grid.cell_area / blocks.cell_area, sums(held)
+        blocks, part = grid.coarse, grid.cell_area / grid.coarse.cell_area
+        free, loads, left, place = passes.block_sums(grid, found)
         displaced = blocks.displacement((loads * part).reshape(blocks.shape)).reshape(-1)
-        smooth, spread = passes.spot_sums(loads, displaced, free)
-        if not energy > smooth:
+        smooth, spread, whole = passes.spot_sums(loads, displaced, free, FULL * grid.size / blocks.size)
+        if (1 - whole / max(found.cells.size, 1)) * min(blocks.shape) < SPOTS or not found.energy > smooth:
             return None
-        return cls(blocks, block, sums, free, part, LOCAL_SHARE * (energy - smooth) / spread)
-
-    def mean(self, sums: Array) -> Array:
-        """Return the mean over the free cells of each block from the sum; zero if there are none."""
-        return sums / self.blocks.xp.maximum(self.free, 1)
+        return cls(blocks, place, free, left, part, LOCAL_SHARE * (found.energy - smooth) / spread)

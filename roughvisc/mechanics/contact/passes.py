@@ -1,18 +1,21 @@
-"""Passes of the contact solver over the free cells. Each goes over them once and returns all its sums together.
+"""Passes of the contact solver over the free cells.
 
-On a GPU each pass is one kernel of :mod:`roughvisc.mechanics.contact.kernels`, which has the same functions: the launch
-of a kernel and the copy of a number to the host take longer than the pass itself.
+On a GPU they are kernels of :mod:`roughvisc.mechanics.contact.kernels`, which has the same functions: the launch of a
+kernel and the copy of a number to the host take longer than most passes. Each pass therefore copies all its sums at
+once.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from roughvisc.mechanics.grid import Grid, namespace
+
+if TYPE_CHECKING:
+    from roughvisc.mechanics.contact.long_waves import LongWaves
 
 Array = Any  # an array of NumPy or CuPy
 #: Cells [index], change, response (whole field) and curvature of the last step.
@@ -27,12 +30,18 @@ BLOCK_TOLERANCE, BLOCK_ITERATIONS = 0.1, 4
 
 
 class Free(NamedTuple):
-    """Pressure and residual at the free cells, and their sums.
+    """The cells that carry pressure or penetrate.
 
     Attributes
     ----------
+    cells : array of int, shape (n,)
+        The free cells, in ascending order.
     held, residual : array, shape (n,)
-        Pressure, and separation without the approach.
+        Pressure, and separation without the approach; under a load the residual has no mean.
+    level : float
+        Approach.
+    touching : int
+        Number of cells in contact.
     size : float
         Largest absolute residual.
     total, highest_pressure : float
@@ -41,10 +50,15 @@ class Free(NamedTuple):
         Smallest and largest separation; the approach and zero without free cells.
     weighted, energy : float
         Sum of pressure times separation, and of pressure times displacement.
+    ends : array of int, optional
+        On a GPU, number of free cells up to the end of each segment, a part of a row that lies in a block.
     """
 
+    cells: Array
     held: Array
     residual: Array
+    level: float
+    touching: int
     size: float
     total: float
     highest_pressure: float
@@ -52,17 +66,20 @@ class Free(NamedTuple):
     most: float
     weighted: float
     energy: float
+    ends: Array | None = None
 
 
-def free_cells(
-    pressure: Array, separation: Array, cells: Array, level: float, under_load: bool, present: Array | None
-) -> tuple[Array, float, int]:
-    """Return the cells that carry pressure or penetrate, the approach, and the number of cells in contact.
+def measure(
+    pressure: Array, separation: Array, gap: Array, cells: Array, level: float, under_load: bool, present: Array | None
+) -> Free:
+    """Return the free cells with their pressure and residual.
 
     Parameters
     ----------
     pressure, separation : array, shape (nx ny,)
         Pressure, and separation at zero approach.
+    gap : array, shape (nx, ny)
+        Gap without pressure.
     cells : array of int
         Cells that contain the contact; only the kernels of a GPU use them.
     level : float
@@ -79,26 +96,43 @@ def free_cells(
     if present is not None:
         free &= present
     free |= touches
-    return free.nonzero()[0], level, contact.size
-
-
-def measure(pressure: Array, separation: Array, gap: Array, cells: Array, level: float, under_load: bool) -> Free:
-    """Return pressure and residual at the free cells; under a load the residual has no mean."""
+    cells = free.nonzero()[0]
     held, at = pressure.take(cells), separation.take(cells)
     residual = at - level
     if not cells.size:
-        return Free(held, residual, 0.0, 0.0, 0.0, level, 0.0, 0.0, 0.0)
+        return Free(cells, held, residual, level, 0, 0.0, 0.0, 0.0, level, 0.0, 0.0, 0.0)
     mean = float(residual.sum()) / cells.size if under_load else 0.0
     residual -= mean
     highest, least, most = float(held.max()), float(at.min()), float(at.max())
     size, weighted = max(most - level - mean, mean - (least - level)), inner(held, at)
-    energy = max(weighted - inner(held, gap.take(cells)), 0.0)
-    return Free(held, residual, size, float(held.sum()), highest, least, most, weighted, energy)
+    energy = max(weighted - inner(held, gap.reshape(-1).take(cells)), 0.0)
+    total = float(held.sum())
+    return Free(cells, held, residual, level, contact.size, size, total, highest, least, most, weighted, energy)
 
 
-def taken(field: Array, cells: Array, factor: float) -> Array:
-    """Return the values of a field at given cells, multiplied by a factor, in double precision."""
-    return namespace(field).multiply(field.reshape(-1).take(cells), factor, dtype=float)
+def preconditioned(grid: Grid, found: Free, waves: LongWaves | None, on_grid: Scatter) -> Array:
+    """Return the pressure that approximately removes the residual, at the free cells.
+
+    Parameters
+    ----------
+    grid : Grid
+        Cells.
+    found : Free
+        The free cells.
+    waves : LongWaves or None
+        Second level of the preconditioner.
+    on_grid : Scatter
+        Field on the cells.
+    """
+    xp, rest = grid.xp, found.residual
+    if waves is not None:
+        rest = rest - (waves.left / xp.maximum(waves.free, 1))[waves.place]
+    solution = grid.inverse(on_grid(rest, found.cells, found.size))
+    direction = xp.multiply(solution.reshape(-1).take(found.cells), found.size, dtype=float)
+    if waves is not None:
+        total = xp.bincount(waves.place, direction, waves.blocks.size)
+        direction += (block_pressure(waves) - total / xp.maximum(waves.free, 1))[waves.place]
+    return direction
 
 
 def conjugate(
@@ -182,7 +216,7 @@ def line_search(
 
 
 class Scatter:
-    """Field of zeros that receives the values of some cells."""
+    """Fields of zeros that receive the values of some cells."""
 
     def __init__(self, zeros: Array) -> None:
         #: Field and its present values, in double and in single precision. The same values are not set again.
@@ -194,43 +228,32 @@ class Scatter:
         field, last = self.fields[is_single]
         if values is not last:
             field[...] = 0
-            field.reshape(-1)[cells] = (values / divisor).astype(np.float32) if is_single else values
+            self.put(field.reshape(-1), values, cells, divisor)
             self.fields[is_single] = field, values
         return field
 
-
-def block_sums(grid: Grid, cells: Array, block: Array, on_grid: Scatter) -> Callable[[Array], Array]:
-    """Return a function that sums the values of the free cells over the blocks of the coarse grid.
-
-    Parameters
-    ----------
-    grid : Grid
-        Cells.
-    cells, block : array of int, shape (n,)
-        The free cells, and the block of each.
-    on_grid : Scatter
-        Field on the cells.
-    """
-    return lambda values: grid.xp.bincount(block, values, grid.coarse.size)
+    def put(self, field: Array, values: Array, cells: Array, divisor: float | None) -> None:
+        """Set the values of some cells."""
+        field[cells] = values if divisor is None else (values / divisor).astype(np.float32)
 
 
-def spot_sums(loads: Array, displaced: Array, free: Array) -> tuple[float, float]:
-    """Return the sums of the loads of blocks times their displacement, and of their squares over the free cells."""
-    return inner(loads, displaced), float((loads * loads / namespace(free).maximum(free, 1)).sum())
+def block_sums(grid: Grid, found: Free) -> tuple[Array, Array, Array, Array]:
+    """Return number, pressure and residual of the free cells of each block, and the block of each free cell."""
+    xp, place, count = grid.xp, grid.block_of_cell.take(found.cells), grid.coarse.size
+    free, loads, left = (xp.bincount(place, one, count) for one in (xp.ones(place.size), found.held, found.residual))
+    return free, loads, left, place
 
 
-def block_pressure(blocks: Grid, left: Array, free: Array, local: float, part: float) -> Array:
-    """Solve, by conjugate gradients, for the pressures that displace the blocks by their mean residual.
+def spot_sums(loads: Array, displaced: Array, free: Array, full: float) -> tuple[float, float, float]:
+    """Return sums over the blocks: load times displacement, squared load over free cells, free cells of full blocks."""
+    xp = namespace(free)
+    spread, whole = (loads * loads / xp.maximum(free, 1)).sum(), xp.where(free > full, free, 0).sum()
+    return inner(loads, displaced), float(spread), float(whole)
 
-    Parameters
-    ----------
-    blocks : Grid
-        Grid of the blocks.
-    left, free : array, shape (m,)
-        Sum of the residual, and number of free cells; the residual is overwritten.
-    local, part : float
-        Local compliance [m], and area of a cell over the area of a block.
-    """
+
+def block_pressure(waves: LongWaves) -> Array:
+    """Solve, by conjugate gradients, for the pressures that displace the blocks by their mean residual."""
+    blocks, left, free, local, part = waves.blocks, waves.left, waves.free, waves.local, waves.part
     xp = blocks.xp
     diagonal = xp.where(free > 0, free * local + free * free * blocks.self_influence * part, 1)
     found, eased = xp.zeros_like(left), left / diagonal
@@ -243,7 +266,7 @@ def block_pressure(blocks: Grid, left: Array, free: Array, local: float, part: f
         response = free * (displaced + local * search)
         length = squared / inner(search, response)
         found += length * search
-        left -= length * response
+        left = left - length * response
         eased = left / diagonal
         before, squared = squared, inner(left, eased)
         search = eased + squared / before * search

@@ -204,9 +204,8 @@ def solve_contact(
             previous = None
 
         # Approach of the present contact, equation (7) of the paper, and the cells that may change, (14).
-        cells, level, touching = passes.free_cells(pressure, separation, cells, level, under_load, present)
-        found = passes.measure(pressure, separation, given, cells, level, under_load)
-        held, residual, size, total, energy = found.held, found.residual, found.size, found.total, found.energy
+        found = passes.measure(pressure, separation, given.reshape(gap.shape), cells, level, under_load, present)
+        cells, held, residual, level, touching, size, total, *_ = found
         lowest, highest = min(found.least, level), max(found.most, -found.least, 0.0)
         if under_load:
             duality = max(found.weighted - lowest * total, 0.0)
@@ -225,7 +224,9 @@ def solve_contact(
         elif iteration:
             error = requested_size * math.sqrt(duality / requested_duality) / max(total, 1e-300)
         is_empty = size > 0 and total == 0  # a step has emptied all cells although the surfaces overlap
-        is_solved = error <= tolerance and duality <= max(GAP_SLACK * tolerance * energy, rounding) and not is_empty
+        is_solved = (
+            error <= tolerance and duality <= max(GAP_SLACK * tolerance * found.energy, rounding) and not is_empty
+        )
         if is_solved and is_blind and 4 * touching > gap.size:
             error += load_error(grid, separation.reshape(gap.shape), xp.flatnonzero(pressure), level, present, total)
             is_solved = error <= tolerance
@@ -234,15 +235,8 @@ def solve_contact(
         if iteration == max_iterations:
             raise ConvergenceError(unsolved(iteration, error, tolerance))
         best, stalled = (duality, 0) if duality < best / 2 else (best, stalled + 1)
-        waves = LongWaves.of(grid, cells, held, energy, on_grid, passes) if has_blocks else None
-        rest = residual
-        if waves is not None:
-            sums = waves.sums(residual)
-            rest = residual - waves.mean(sums)[waves.block]
-        direction = passes.taken(grid.inverse(on_grid(rest, cells, size)), cells, size)
-        if waves is not None:
-            eased = passes.block_pressure(waves.blocks, sums, waves.free, waves.local, waves.part)
-            direction += (eased - waves.mean(waves.sums(direction)))[waves.block]
+        waves = LongWaves.of(grid, found, passes) if has_blocks else None
+        direction = passes.preconditioned(grid, found, waves, on_grid)
         # Conjugate to the step before, on the cells that are free now.
         direction, requested_size = passes.conjugate(direction, residual, previous, on_grid, cells, under_load)
         previous = response = None  # frees the last response before the next one is computed
@@ -301,7 +295,7 @@ def solve_contact(
         approach=level * unit + lowest_gap,
         load=total * unit,
         error=error,
-        bound=math.sqrt(2 * duality / energy) if energy > 0 else 0.0,
+        bound=math.sqrt(2 * duality / found.energy) if found.energy > 0 else 0.0,
         approach_error=duality / total * unit if total > 0 else 0.0,
         iterations=iteration,
     )

@@ -1,8 +1,10 @@
 """The kernels of a GPU, compiled for the processor, give what the passes of NumPy give on random contacts."""
 
 import ctypes
+import re
 import shutil
 import subprocess
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,65 +13,44 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from roughvisc.mechanics.contact import kernels as kernels_of_a_gpu
-from roughvisc.mechanics.contact import passes
+from roughvisc.mechanics.contact import long_waves, passes, solver
+from roughvisc.mechanics.contact.long_waves import LongWaves
 from roughvisc.mechanics.grid import Grid
-
-#: One thread of one block, on the processor.
-SHIM = """
-extern "C" double fmax(double, double);
-extern "C" double fabs(double);
-#define __global__
-#define __shared__
-static inline void __syncthreads() {}
-static struct { int x; } blockIdx = {0}, blockDim = {1}, threadIdx = {0}, gridDim = {1};
-"""
 
 
 @pytest.fixture(scope="module")
 def kernels(tmp_path_factory):
-    compiler, folder = shutil.which("c++"), tmp_path_factory.mktemp("kernels")
+    compiler, library = shutil.which("c++"), tmp_path_factory.mktemp("kernels") / "kernels.so"
     if compiler is None:
         pytest.skip("no C++ compiler")
+    source = Path(kernels_of_a_gpu.__file__).with_suffix(".cu").read_text()
+    parts = [Path(__file__).with_name("cuda.h").read_text(), source.replace('extern "C" __global__', "static")]
+    for name, parameters in re.findall(r"__global__ void (\w+)\((.*?)\) \{", source, re.DOTALL):
+        names = ", ".join(re.findall(r"(\w+)(?:,|$)", parameters)).replace("SUMS", "parts, ended, results")
+        parts.append(f'extern "C" void run_{name}(int blocks, int threads, {parameters}) {{')
+        parts.append(f"run(blocks, threads, [=] {{ {name}({names}); }}); }}")
+    flags = ["-x", "c++", "-ffp-contract=off", "-pthread", "-shared", "-fPIC"]
+    subprocess.run([compiler, *flags, "-o", library, "-"], input="\n".join(parts).encode(), check=True)
 
-    class RawKernel:
-        def __init__(self, source, name):
-            library = folder / f"{name}{'float' in source}.so"
-            subprocess.run(
-                [compiler, "-x", "c++", "-ffp-contract=off", "-shared", "-fPIC", "-o", library, "-"],
-                input=(SHIM + source).encode(),
-                check=True,
-            )
-            self.call = getattr(ctypes.CDLL(str(library)), name)
+    def plain(value):
+        if isinstance(value, np.ndarray):
+            assert value.flags.c_contiguous
+            return ctypes.c_void_p(value.ctypes.data)
+        return ctypes.c_longlong(value) if isinstance(value, int) else ctypes.c_double(value)
 
-        def __call__(self, blocks, threads, arguments):
-            def plain(value):
-                if isinstance(value, np.ndarray):
-                    assert value.flags.c_contiguous
-                    return ctypes.c_void_p(value.ctypes.data)
-                return ctypes.c_longlong(value) if isinstance(value, int) else ctypes.c_double(value)
+    def get_function(name):
+        call = getattr(ctypes.CDLL(str(library)), f"run_{name}")
+        return lambda blocks, threads, arguments: call(*blocks, *threads, *map(plain, arguments))
 
-            self.call(*map(plain, arguments))
-
-    class Parts(np.ndarray):
-        def get(self):
-            return np.asarray(self)
-
-    cupy = SimpleNamespace(
-        RawKernel=RawKernel,
-        empty=lambda shape, kind=float: np.empty(shape, kind).view(Parts),
-        zeros=np.zeros,
-        flatnonzero=np.flatnonzero,
-    )
+    cupy = SimpleNamespace(empty=np.empty, zeros=np.zeros, cumsum=np.cumsum)
+    cupy.RawModule = lambda code: SimpleNamespace(get_function=get_function)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(kernels_of_a_gpu, "cupy", cupy)
-        patch.setattr(kernels_of_a_gpu, "BLOCKS", 1)
-        threads = kernels_of_a_gpu.THREADS
-        for value in vars(kernels_of_a_gpu).values():
-            if isinstance(value, kernels_of_a_gpu.Kernel):
-                source = value._source.replace(f"shared[{threads}]", "shared[1]")
-                patch.setattr(value, "_source", source.replace(f"half = {threads} / 2", "half = 0"))
-                patch.setattr(value, "_compiled", {})
+        patch.setattr(kernels_of_a_gpu, "THREADS", 4)
+        patch.setattr(kernels_of_a_gpu, "BLOCKS", 3)
         yield kernels_of_a_gpu
+        for cached in (kernels_of_a_gpu.module, kernels_of_a_gpu.kernel, kernels_of_a_gpu.space):
+            cached.cache_clear()
 
 
 def same(found, expected):
@@ -81,29 +62,25 @@ def same(found, expected):
 @settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     seed=st.integers(0, 10**6),
-    size=st.integers(1, 60),
+    shape=st.tuples(st.integers(1, 6), st.integers(1, 20)),
     under_load=st.booleans(),
-    single=st.booleans(),
+    partial=st.booleans(),
     old=st.booleans(),
 )
-def test_kernels__are_the_passes_of_numpy(kernels, seed, size, under_load, single, old):
-    random = np.random.default_rng(seed)
+def test_kernels__are_the_passes_of_numpy(kernels, seed, shape, under_load, partial, old):
+    random, size = np.random.default_rng(seed), shape[0] * shape[1]
     pressure = np.maximum(random.normal(size=size), 0)
-    separation, gap = random.normal(size=size), random.random(size)
+    separation, gap = random.normal(size=size), random.random(shape)
     response = random.normal(size=size)
-    cells = np.flatnonzero(pressure >= 0)
     level, under_load = float(random.normal()), under_load and bool(pressure.any())
-    present = pressure >= 0 if single else None
-    both = [one.free_cells(pressure, separation, cells, level, under_load, present) for one in (kernels, passes)]
-    same(*both)
-    cells, level, _ = both[1]
-    both = [one.measure(pressure, separation, gap, cells, level, under_load) for one in (kernels, passes)]
-    same(*both)
+    present = (pressure > 0) | (random.random(size) > 0.3) if partial else None
+    cells = np.sort(random.choice(size, size, replace=False))
+    given = pressure, separation, gap, cells, level, under_load, present
+    both = [one.measure(*given)._replace(ends=None) for one in (kernels, passes)]
+    same(*(found[:-1] for found in both))
+    cells, held, residual, *_ = both[1]
     if not cells.size:
         return
-    held, residual = both[1].held, both[1].residual
-    eased = response.astype(np.float32 if single else np.float64)
-    same(*([one.taken(eased, cells, 3.0)] for one in (kernels, passes)))
     old_cells = np.sort(random.choice(size, random.integers(1, size + 1), replace=False))
     last = (old_cells, random.normal(size=old_cells.size), response, 0.7) if old else None
 
@@ -131,18 +108,45 @@ def test_kernels__are_the_passes_of_numpy(kernels, seed, size, under_load, singl
 
 
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(seed=st.integers(0, 10**6), shape=st.tuples(st.integers(8, 50), st.integers(8, 50)))
-def test_kernels__solve_for_the_blocks_as_numpy_does(kernels, seed, shape):
+@given(
+    seed=st.integers(0, 10**6),
+    shape=st.tuples(st.integers(8, 50), st.integers(8, 50)),
+    contact=st.floats(0.05, 0.9),
+)
+def test_kernels__precondition_as_numpy_does(kernels, seed, shape, contact):
     random, grid = np.random.default_rng(seed), Grid(shape, (1.0, 1.3), "periodic")
-    cells = np.sort(random.choice(grid.size, grid.size // 3, replace=False))
-    block, values = grid.block_of_cell.take(cells), random.normal(size=cells.size)
     fields = [one.Scatter(np.zeros(shape)) for one in (kernels, passes)]
-    for divisor in (None, 0.3, None):  # the next field overwrites the last one, in another precision
-        few = np.sort(random.choice(cells, cells.size // 2, replace=False))
-        same(*([one(values[: few.size], few, divisor)] for one in fields))
-    sums = [one.block_sums(grid, cells, block, field) for one, field in zip((kernels, passes), fields, strict=True)]
-    same(*([one(values)] for one in sums))
-    free, loads = sums[1](np.ones(cells.size)), sums[1](abs(values))
-    same(*(one.spot_sums(loads, np.sqrt(loads), free) for one in (kernels, passes)))
-    left = sums[1](values)
-    same(*([one.block_pressure(grid.coarse, left.copy(), free, 0.4, 1 / 64)] for one in (kernels, passes)))
+    for divisor in (None, 0.3, None):  # the next field overwrites the last one of its precision
+        cells, values = np.flatnonzero(random.random(grid.size) < 0.5), random.normal(size=grid.size)
+        same(*([one(values[: cells.size], cells, divisor)] for one in fields))
+    pressure, separation = (random.random(grid.size) < contact).astype(float), random.normal(size=grid.size)
+    given = pressure, separation, np.zeros(shape), np.arange(grid.size), 0.0, False, None
+    found = [one.measure(*given) for one in (kernels, passes)]
+    sums = [one.block_sums(grid, free) for one, free in zip((kernels, passes), found, strict=True)]
+    same(*(one[:3] for one in sums))
+    free, loads, left, _ = sums[1]
+    same(*(one.spot_sums(loads, np.sqrt(abs(loads)), free, 50.0) for one in (kernels, passes)))
+    for waves in (False, True):
+        directions = []
+        for one, free_cells, blocks, on_grid in zip((kernels, passes), found, sums, fields, strict=True):
+            level = LongWaves(grid.coarse, blocks[3], free, left.copy(), 1 / 64, 0.4) if waves else None
+            directions.append(one.preconditioned(grid, free_cells, level, on_grid))
+        np.testing.assert_allclose(*directions, rtol=1e-5, atol=1e-5 * float(abs(directions[1]).max()))
+
+
+@pytest.mark.parametrize("given", [{"load": 2.0}, {"approach": 0.8}])
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_kernels__solve_contact_as_numpy_does(kernels, monkeypatch, given, boundary):
+    monkeypatch.setattr(solver, "BLOCKS_FROM", 30)
+    monkeypatch.setattr(long_waves, "SPOTS", 1.0)
+    random, (nx, ny) = np.random.default_rng(1), (47, 64)
+    gap, present = random.random((nx, ny)), random.random((nx, ny)) < 0.9
+    found = []
+    for one in (passes, kernels):
+        monkeypatch.setattr(solver, "host", one)
+        grid = Grid((nx, ny), (0.9, 1.1), boundary)
+        found.append(solver.solve_contact(grid, gap, tolerance=1e-10, present=present, **given))
+    for name in ("pressure", "displacement", "approach", "load"):
+        one, other = (np.asarray(getattr(state, name)) for state in found)
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * float(abs(other).max()))
+    assert abs(found[0].iterations - found[1].iterations) <= 1
