@@ -14,7 +14,7 @@ import numpy as np
 from roughvisc.errors import TooLargeError
 from roughvisc.experiment.accuracy import memory_of
 from roughvisc.mechanics.body import Body
-from roughvisc.mechanics.grid import arrays_of
+from roughvisc.mechanics.grid import KEPT_FREE, arrays_of
 from roughvisc.mechanics.memory import LayerMemory, Memory
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import PACKED_FROM, SOFT
@@ -119,7 +119,7 @@ def march_bytes(
     Notes
     -----
     The numbers of fields are measured by ``workflows/benchmarks/memory.py``. At the end the fields kept in memory are
-    copied into one array.
+    copied into one array. Large ones are freed one by one; the memory of small ones does not return to the system.
     """
     exponentials, layered = memory.times.size, isinstance(memory, LayerMemory)
     # a smaller domain also keeps the pressure that causes the displacement
@@ -132,7 +132,8 @@ def march_bytes(
     if layered:
         solved += 0.5 * kept * (exponentials + 1)  # symbols
     frames, surface = rows * len(settings.fields), _SURFACE + (_WHOLE if part < 1 else 0.0)
-    return 8.0 * cells * (surface + frames + max(part * solved, frames))
+    copied = frames if 8 * cells <= KEPT_FREE else 1.0
+    return 8.0 * cells * (surface + frames + max(part * solved, copied))
 
 
 def curve_bytes(settings: Settings, cells: float) -> float:

@@ -42,9 +42,10 @@ THREADED_FROM = 1024**2
 APART = 16
 #: Cells a side of a block of the coarse grid.
 COARSE = 8
-# Once glibc has freed an array of almost 32 MiB, it keeps smaller ones for reuse. Otherwise it returns each to the
-# system, and a solve takes up to 15 % more time (measured at 256 and 512 squared).
-np.empty(31 << 20, np.uint8)
+#: Once glibc has freed an array of almost 32 MiB, it keeps smaller ones for reuse. Otherwise it returns each to the
+#: system, and a solve takes up to 15 % more time (measured at 256 and 512 squared). [byte]
+KEPT_FREE = 31 << 20
+np.empty(KEPT_FREE, np.uint8)
 
 
 def namespace(array: Array) -> Any:
