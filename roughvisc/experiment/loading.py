@@ -23,7 +23,7 @@ from roughvisc.mechanics.contact.solver import contact_area
 from roughvisc.mechanics.grid import Grid, arrays_of, to_host
 from roughvisc.mechanics.memory import History
 from roughvisc.mechanics.program import Program
-from roughvisc.mechanics.stepping import SOFT, Difference, Point, Scene, State, Step, march
+from roughvisc.mechanics.stepping import SOFT, Difference, Packed, Point, Scene, State, Step, march
 from roughvisc.mechanics.tangential import tangential_force
 from roughvisc.settings import Problem, Settings, kept_times
 from roughvisc.topography.recipes import grown
@@ -68,7 +68,7 @@ class LoadingState:
 
 
 #: Dataclasses in the state of a row, for checkpoints. Its other parts are plain values, tuples and arrays.
-STATES = (LoadingState, State, Point, History, Difference)
+STATES = (LoadingState, State, Point, Packed, History, Difference)
 
 
 @dataclass(frozen=True)
@@ -300,12 +300,12 @@ class LoadingRows(Rows):
             if "displacement" in names or "gap" in names:
                 beyond["displacement"] = domain.displacement(effective)
                 beyond["gap"] = np.maximum(profile.gap + beyond["displacement"] - point.approach, 0.0)
-        fields = {}
+        fields = dict[str, Any]()
         for name in names:
-            if name == "pressure":
-                fields[name] = pressure if xp is np else point.pressure_on_host
+            if name == "pressure" and isinstance(point.stored_pressure, Packed):
+                fields[name] = point.stored_pressure.on_host()
             else:
-                fields[name] = to_host(displacement if name == "displacement" else gap)
+                fields[name] = to_host({"pressure": pressure, "displacement": displacement, "gap": gap}[name])
             if beyond:
                 beyond[name][domain.cells] = fields[name]
                 fields[name] = beyond[name]

@@ -119,7 +119,8 @@ def march_bytes(
     Notes
     -----
     The numbers of fields are measured by ``workflows/benchmarks/memory.py``. At the end the fields kept in memory are
-    copied into one array. Large ones are freed one by one; the memory of small ones does not return to the system.
+    copied into one array, while half the memory of the solve is still in use. Large ones are freed one by one; the
+    memory of small ones does not return to the system. Packed pressures take little memory until then.
     """
     exponentials, layered = memory.times.size, isinstance(memory, LayerMemory)
     # a smaller domain also keeps the pressure that causes the displacement
@@ -132,8 +133,9 @@ def march_bytes(
     if layered:
         solved += 0.5 * kept * (exponentials + 1)  # symbols
     frames, surface = rows * len(settings.fields), _SURFACE + (_WHOLE if part < 1 else 0.0)
-    copied = frames if 8 * cells <= KEPT_FREE else 1.0
-    return 8.0 * cells * (surface + frames + max(part * solved, copied))
+    dense = frames - rows * (is_packed and part == 1 and "pressure" in settings.fields)
+    copied = frames + (dense if 8 * cells <= KEPT_FREE else 1.0)
+    return 8.0 * cells * (surface + part * solved / 2 + max(part * solved / 2 + dense, copied))
 
 
 def curve_bytes(settings: Settings, cells: float) -> float:

@@ -182,6 +182,43 @@ class Scene:
 
 
 @dataclass(frozen=True)
+class Packed:
+    """Field that is zero outside the contact. NumPy takes it for an array.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        Shape of the field.
+    cells : array of int, shape (n,)
+        Contact cells, as flat indices.
+    values : array, shape (n,)
+        Values there.
+    """
+
+    shape: tuple[int, int]
+    cells: Array
+    values: Array
+
+    @property
+    def nbytes(self) -> int:
+        """Memory. [byte]"""
+        return int(self.cells.nbytes + self.values.nbytes)
+
+    def field(self) -> Array:
+        """Return the whole field, an array of the kind of its values."""
+        field = namespace(self.values).zeros(math.prod(self.shape))
+        field[self.cells] = self.values
+        return field.reshape(self.shape)
+
+    def on_host(self) -> Packed:
+        """Return the field with arrays of NumPy."""
+        return Packed(self.shape, to_host(self.cells), to_host(self.values))
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.asarray(self.on_host().field(), dtype)
+
+
+@dataclass(frozen=True)
 class Point:
     """Solution at an instant.
 
@@ -189,8 +226,8 @@ class Point:
     ----------
     time : float
         Time. [s]
-    stored_pressure : array or tuple
-        Pressure, shape (nx, ny) [Pa]; or this shape, the contact cells as flat indices, and their pressure [Pa].
+    stored_pressure : array, shape (nx, ny), or Packed
+        Pressure. [Pa]
     force, approach : float
         Normal force and approach. [N, m]
     history : History
@@ -206,11 +243,11 @@ class Point:
     """
 
     time: float
-    stored_pressure: Any
+    stored_pressure: Array | Packed
     force: float
     approach: float
     history: History
-    before: tuple[float, Any, Array | None] | None = None
+    before: tuple[float, Array | Packed, Array | None] | None = None
     start: float = 0.0
     is_late: bool = False
     solver_error: float = 0.0
@@ -219,20 +256,7 @@ class Point:
     @property
     def pressure(self) -> Array:
         """Pressure at all cells, shape (nx, ny). [Pa]"""
-        if not isinstance(self.stored_pressure, tuple):
-            return self.stored_pressure
-        shape, cells, values = self.stored_pressure
-        field = namespace(values).zeros(math.prod(shape))
-        field[cells] = values
-        return field.reshape(shape)
-
-    @property
-    def pressure_on_host(self) -> np.ndarray:
-        """Pressure at all cells as an array of NumPy. From a device only stored values are copied. [Pa]"""
-        if not isinstance(self.stored_pressure, tuple):
-            return to_host(self.stored_pressure)
-        shape, cells, values = self.stored_pressure
-        return replace(self, stored_pressure=(shape, to_host(cells), to_host(values))).pressure
+        return self.stored_pressure.field() if isinstance(self.stored_pressure, Packed) else self.stored_pressure
 
 
 @dataclass(frozen=True)
@@ -891,7 +915,7 @@ def take_step(
     errors, stored = (found.error, found.approach_error), pressure
     if pressure.size >= PACKED_FROM and 2 * int((pressure > 0).sum()) < pressure.size:
         cells = grid.xp.flatnonzero(pressure).astype(np.int32)
-        stored = pressure.shape, cells, pressure.reshape(-1)[cells]
+        stored = Packed(pressure.shape, cells, pressure.reshape(-1)[cells])
     return Point(time, stored, force, approach, history, before, here.start, False, *errors)
 
 
