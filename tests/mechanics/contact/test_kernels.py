@@ -53,10 +53,13 @@ def kernels(tmp_path_factory):
             cached.cache_clear()
 
 
-def same(found, expected):
+def same(kernels, call):
+    """Compare what a call gives with the kernels and with the passes of NumPy, and return the latter."""
+    found, expected = call(kernels), call(passes)
     for one, other in zip(found, expected, strict=True):
         other = np.asarray(other, dtype=float)
         np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * float(abs(other).max(initial=0)))
+    return expected
 
 
 @settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -74,37 +77,29 @@ def test_kernels__are_the_passes_of_numpy(kernels, seed, shape, under_load, part
     response = random.normal(size=size)
     level, under_load = float(random.normal()), under_load and bool(pressure.any())
     present = (pressure > 0) | (random.random(size) > 0.3) if partial else None
-    cells = np.sort(random.choice(size, size, replace=False))
-    given = pressure, separation, gap, cells, level, under_load, present
-    both = [one.measure(*given)._replace(ends=None) for one in (kernels, passes)]
-    same(*(found[:-1] for found in both))
-    cells, held, residual, *_ = both[1]
+    given = pressure, separation, gap, np.arange(size), level, under_load, present
+    cells, held, residual, *_ = same(kernels, lambda one: one.measure(*given)[:-1])
     if not cells.size:
         return
     old_cells = np.sort(random.choice(size, random.integers(1, size + 1), replace=False))
     last = (old_cells, random.normal(size=old_cells.size), response, 0.7) if old else None
 
     def on_grid(values, places):
-        field = np.zeros(size)
-        field[places] = values
-        return field
+        return np.bincount(places, values, size)
 
     direction = random.normal(size=cells.size)
-    both = [one.conjugate(direction.copy(), residual, last, on_grid, cells, under_load) for one in (kernels, passes)]
-    same(*both)
-    direction = both[1][0]
+    rest = residual, last, on_grid, cells, under_load
+    direction, _ = same(kernels, lambda one: one.conjugate(direction.copy(), *rest))
     load = 1.3 if under_load else None
-    both = [one.cut_step(held, direction, residual, 0.3, load) for one in (kernels, passes)]
-    same(*both)
-    trial, change, _ = both[1]
+    trial, change, _ = same(kernels, lambda one: one.cut_step(held, direction, residual, 0.3, load))
     for minimum in (0.2, 0.8, 1.5, 20.0):
         slope = -minimum * abs(float(change @ response[cells]))
-        same(*(one.line_search(held, trial, change, slope, response, cells) for one in (kernels, passes)))
+        same(kernels, lambda one, slope=slope: one.line_search(held, trial, change, slope, response, cells))
     for fraction in (0.4, 1.0):
-        both = [(pressure.copy(), separation.copy()) for _ in range(2)]
-        kernels.advance(*both[0], cells, (held, trial, change), response, fraction)
-        passes.advance(*both[1], cells, (held, trial, change), response, fraction)
-        same(*both)
+        fields = {one: (pressure.copy(), separation.copy()) for one in (kernels, passes)}
+        for one, both in fields.items():
+            one.advance(*both, cells, (held, trial, change), response, fraction)
+        same(kernels, fields.get)
 
 
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -115,22 +110,21 @@ def test_kernels__are_the_passes_of_numpy(kernels, seed, shape, under_load, part
 )
 def test_kernels__precondition_as_numpy_does(kernels, seed, shape, contact):
     random, grid = np.random.default_rng(seed), Grid(shape, (1.0, 1.3), "periodic")
-    fields = [one.Scatter(np.zeros(shape)) for one in (kernels, passes)]
+    fields = {one: one.Scatter(np.zeros(shape)) for one in (kernels, passes)}
     for divisor in (None, 0.3, None):  # the next field overwrites the last one of its precision
         cells, values = np.flatnonzero(random.random(grid.size) < 0.5), random.normal(size=grid.size)
-        same(*([one(values[: cells.size], cells, divisor)] for one in fields))
+        same(kernels, lambda one, chosen=(values[: cells.size], cells, divisor): [fields[one](*chosen)])
     pressure, separation = (random.random(grid.size) < contact).astype(float), random.normal(size=grid.size)
     given = pressure, separation, np.zeros(shape), np.arange(grid.size), 0.0, False, None
-    found = [one.measure(*given) for one in (kernels, passes)]
-    sums = [one.block_sums(grid, free) for one, free in zip((kernels, passes), found, strict=True)]
-    same(*(one[:3] for one in sums))
-    free, loads, left, _ = sums[1]
-    same(*(one.spot_sums(loads, np.sqrt(abs(loads)), free, 50.0) for one in (kernels, passes)))
+    found = {one: one.measure(*given) for one in (kernels, passes)}
+    free, loads, left = same(kernels, lambda one: one.block_sums(grid, found[one])[:3])
+    same(kernels, lambda one: one.spot_sums(loads, np.sqrt(abs(loads)), free, 50.0))
     for waves in (False, True):
         directions = []
-        for one, free_cells, blocks, on_grid in zip((kernels, passes), found, sums, fields, strict=True):
-            level = LongWaves(grid.coarse, blocks[3], free, left.copy(), 1 / 64, 0.4) if waves else None
-            directions.append(one.preconditioned(grid, free_cells, level, on_grid))
+        for one, on_grid in fields.items():
+            place = one.block_sums(grid, found[one])[3]
+            level = LongWaves(grid.coarse, place, free, left.copy(), 1 / 64, 0.4) if waves else None
+            directions.append(one.preconditioned(grid, found[one], level, on_grid))
         np.testing.assert_allclose(*directions, rtol=1e-5, atol=1e-5 * float(abs(directions[1]).max()))
 
 
