@@ -1,16 +1,24 @@
 """Check and time a GPU: python workflows/benchmarks/gpu.py [--sizes 512 1024 2048 4096 8192] [--seconds 240]
 
-Each scene runs on the GPU, and up to 1,024 squared also on one core of the CPU: the pressures of both are compared (L1
-norm, over the tolerance; expected: below a hundredth). ``solved_s`` is the time without warnings and copies of fields;
-``pairs`` is this time over that of as many bare pairs of transforms as there are convolutions. Sizes are left out when
-the time is used up. Needs CuPy (``roughvisc[gpu]``).
+First a run is killed three times and resumed, with the bits of a whole run expected, and a surface that is too large
+for the memory left must be refused.
+
+Then each scene runs on the GPU, and up to 1,024 squared also on one core of the CPU: the pressures of both are compared
+(L1 norm, over the tolerance; expected: below a hundredth). ``solved_s`` is the time without warnings and copies of
+fields; ``pairs`` is this time over that of as many bare pairs of transforms as there are convolutions. Sizes are left
+out when the time is used up. Needs CuPy (``roughvisc[gpu]``).
 """
 
 import argparse
+import subprocess
+import sys
 import time
 from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
+import xarray as xr
 
 import roughvisc as rv
 from roughvisc.mechanics.grid import arrays_of, transforms
@@ -21,6 +29,40 @@ GPU, CPU = {"numerics": rv.Numerics(device="gpu")}, {"threads": 1}
 RUBBER = rv.zener(shear_modulus=3e6, kelvin_modulus=1e6, kelvin_viscosity=1e5)
 #: Cells a side up to which a scene also runs on the CPU.
 COMPARED = 1024
+#: Study of the run that is killed.
+STUDY = """
+title = "killed"
+[surface]
+generate = "self_affine"
+size = "1 mm"
+shape = [1100, 1050]
+hurst = 0.8
+rms_slope = 0.1
+rolloff = "0.25 mm"
+shortcut = "16 um"
+seed = 1
+[material]
+model = "zener"
+shear_modulus = "3 MPa"
+kelvin_modulus = "1 MPa"
+kelvin_viscosity = "0.1 MPa s"
+[[program]]
+pressure = "7 kPa"
+over = "10 ms"
+[[program]]
+hold = "0.5 s"
+[solve]
+boundary = "periodic"
+device = "{device}"
+[keep]
+times = 5
+"""
+#: Program that runs a study and writes a checkpoint after each step.
+RUN = """
+import sys, roughvisc as rv
+from roughvisc.study.execution.run import run_case
+run_case(rv.read_study(sys.argv[1]), sys.argv[2], checkpoint_seconds=0)
+"""
 
 
 def rough(cells):
@@ -44,6 +86,49 @@ def friction(height, **device):
 
 
 SCENES = {"creep": creep, "elastic": elastic, "friction": friction}
+
+
+def resume(device="gpu", kills=3):
+    """Kill a run after some steps, several times, and return the variables whose bits differ from those of a whole run.
+
+    Raises
+    ------
+    RuntimeError
+        If a run ends before it can be killed.
+    """
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "study.toml").write_text(STUDY.format(device=device))
+
+        def start(out):
+            (folder / out).mkdir(exist_ok=True)
+            return subprocess.Popen([sys.executable, "-c", RUN, folder / "study.toml", folder / out])
+
+        start("whole").wait()
+        for _ in range(kills):
+            process, saved = start("killed"), set()
+            while len(saved) < 3 and process.poll() is None:
+                saved |= {path.stat().st_mtime_ns for path in folder.glob("killed/*/state.npz")}
+            process.kill()
+            if process.wait() == 0:
+                raise RuntimeError("the run ended before it was killed")
+        start("killed").wait()
+        whole, killed = (xr.load_dataset(next((folder / out).glob("*.nc"))) for out in ("whole", "killed"))
+        names = set(whole.variables) - {"wall_time"}
+        return sorted(one for one in names if whole[one].values.tobytes() != killed[one].values.tobytes())
+
+
+def refusal(xp):
+    """Return the message with which a surface is refused that does not fit in the memory left."""
+    taken = xp.empty(int(xp.cuda.runtime.memGetInfo()[0] - 2**30), np.uint8)
+    try:
+        creep(rough(4096), **GPU)
+    except rv.InputError as error:
+        return str(error)
+    finally:
+        del taken
+        xp.get_default_memory_pool().free_all_blocks()
+    raise RuntimeError("the surface was not refused")
 
 
 def seconds(run):
@@ -96,5 +181,7 @@ if __name__ == "__main__":
     parser.add_argument("--sizes", type=int, nargs="+", default=[512, 1024, 2048, 4096, 8192])
     parser.add_argument("--seconds", type=float, default=240.0)
     given = parser.parse_args()
+    print("bits that differ after kills:", *(resume() or ["none"]))
+    print("refused:", refusal(arrays_of("gpu")), flush=True)
     for row in measure(given.sizes, given.seconds):
         print("  ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()), flush=True)

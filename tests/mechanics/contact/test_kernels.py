@@ -88,8 +88,9 @@ def test_kernels__are_the_passes_of_numpy(kernels, seed, shape, under_load, part
         return np.bincount(places, values, size)
 
     direction = random.normal(size=cells.size)
-    rest = residual, last, on_grid, cells, under_load
-    direction, _ = same(kernels, lambda one: one.conjugate(direction.copy(), *rest))
+    direction, _ = same(
+        kernels, lambda one: one.conjugate(direction.copy(), residual, last, on_grid, cells, under_load)
+    )
     load = 1.3 if under_load else None
     trial, change, _ = same(kernels, lambda one: one.cut_step(held, direction, residual, 0.3, load))
     for minimum in (0.2, 0.8, 1.5, 20.0):
