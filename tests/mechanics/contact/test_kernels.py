@@ -73,8 +73,7 @@ def same(kernels, call):
 def test_kernels__are_the_passes_of_numpy(kernels, seed, shape, under_load, partial, old):
     random, size = np.random.default_rng(seed), shape[0] * shape[1]
     pressure = np.maximum(random.normal(size=size), 0)
-    separation, gap = random.normal(size=size), random.random(shape)
-    response = random.normal(size=size)
+    separation, response, gap = random.normal(size=size), random.normal(size=size), random.random(shape)
     level, under_load = float(random.normal()), under_load and bool(pressure.any())
     present = (pressure > 0) | (random.random(size) > 0.3) if partial else None
     given = pressure, separation, gap, np.arange(size), level, under_load, present
@@ -88,9 +87,8 @@ def test_kernels__are_the_passes_of_numpy(kernels, seed, shape, under_load, part
         return np.bincount(places, values, size)
 
     direction = random.normal(size=cells.size)
-    direction, _ = same(
-        kernels, lambda one: one.conjugate(direction.copy(), residual, last, on_grid, cells, under_load)
-    )
+    rest = residual, last, on_grid, cells, under_load
+    direction, _ = same(kernels, lambda one: one.conjugate(direction.copy(), *rest))
     load = 1.3 if under_load else None
     trial, change, _ = same(kernels, lambda one: one.cut_step(held, direction, residual, 0.3, load))
     for minimum in (0.2, 0.8, 1.5, 20.0):
