@@ -21,11 +21,11 @@ typedef long long Index;
 // Block of a cell. A grid has nx by ny cells and mx by my blocks.
 #define BLOCK_OF(cell) ((cell) / ny * mx / nx * my + (cell) % ny * my / ny)
 
-// The last arguments of a kernel with sums: sums of the blocks of threads, number of these blocks that have ended, and
-// the sums.
-#define SUMS double *parts, unsigned *ended, double *results
+// The last arguments of a kernel with sums: sums of each block of threads, number of these blocks that have ended, and
+// sums of all.
+#define SUM_ARGUMENTS double *parts, unsigned *ended, double *results
 
-// Combines a value of each thread of a block.
+// Combines a value of each thread of a block of threads.
 static __device__ double combined(double* shared, double value, bool is_sum) {
     __syncthreads();
     shared[threadIdx.x] = value;
@@ -54,7 +54,7 @@ struct Totals {
 
     __device__ void largest(int k, double value) { values[sums + k] = fmax(values[sums + k], value); }
 
-    // A block adds up its threads; the block that ends last adds up the blocks.
+    // Each block of threads adds up its threads; the one that ends last adds up all blocks.
     __device__ void finish(volatile double* parts, unsigned* ended, double* results) {
         __shared__ double shared[256];
         __shared__ bool is_last;
@@ -71,8 +71,8 @@ struct Totals {
         if (!is_last) return;
         for (int k = 0; k < sums + maxima; ++k) {
             double value = k < sums ? 0 : -1.0 / 0.0;
-            for (int block = threadIdx.x; block < gridDim.x; block += blockDim.x) {
-                const double part = parts[k * gridDim.x + block];
+            for (int i = threadIdx.x; i < gridDim.x; i += blockDim.x) {
+                const double part = parts[k * gridDim.x + i];
                 value = k < sums ? value + part : fmax(value, part);
             }
             value = combined(shared, value, k < sums);
@@ -85,7 +85,7 @@ struct Totals {
 
 // Sum of the separation over the contact, and number of cells in contact, which are among the given cells.
 extern "C" __global__ void contact_level(Index count, const double* pressure, const double* separation,
-                                         const Index* cells, SUMS) {
+                                         const Index* cells, SUM_ARGUMENTS) {
     Totals<2> totals;
     EACH_ELEMENT {
         if (pressure[cells[i]] > 0) {
@@ -105,7 +105,7 @@ static __device__ bool is_free(double pressure, double separation, double level,
 // separation and times gap; largest: approach, pressure, separation, negative separation.
 extern "C" __global__ void find(Index count, const double* pressure, const double* separation, const double* gap,
                                 const bool* present, Index is_whole, Index ny, Index my, const double* contact,
-                                double given, Index under_load, Index* numbers, SUMS) {
+                                double given, Index under_load, Index* numbers, SUM_ARGUMENTS) {
     Totals<6, 4> totals;
     const double level = under_load ? contact[0] / contact[1] : given;
     totals.largest(0, level);
@@ -160,7 +160,7 @@ extern "C" __global__ void spread_single(Index count, float* field, const Index*
 
 // Sums from which `turn` takes the mean direction and its part along the last step.
 extern "C" __global__ void against_last(Index count, const double* direction, const double* residual,
-                                        const double* response, const double* last, const Index* cells, SUMS) {
+                                        const double* response, const double* last, const Index* cells, SUM_ARGUMENTS) {
     Totals<7> totals;
     EACH_ELEMENT {
         const double d = direction[i], r = residual[i], f = last[cells[i]], u = response[cells[i]];
@@ -178,7 +178,7 @@ extern "C" __global__ void against_last(Index count, const double* direction, co
 // Makes the direction conjugate to the last step, if there is one and the direction still descends then. Sum: absolute
 // direction before.
 extern "C" __global__ void turn(Index count, double* direction, const double* last, const Index* cells,
-                                const double* sums, double curvature, Index under_load, SUMS) {
+                                const double* sums, double curvature, Index under_load, SUM_ARGUMENTS) {
     Totals<1> totals;
     const double mean = under_load ? sums[0] / count : 0;
     double beta = 0, last_mean = 0;
@@ -198,7 +198,7 @@ extern "C" __global__ void turn(Index count, double* direction, const double* la
 
 // A step, cut at zero pressure. Sum: its pressure.
 extern "C" __global__ void cut(Index count, const double* held, const double* direction, double length, double* trial,
-                               SUMS) {
+                               SUM_ARGUMENTS) {
     Totals<1> totals;
     EACH_ELEMENT {
         trial[i] = fmax(held[i] - length * direction[i], 0.0);
@@ -209,7 +209,7 @@ extern "C" __global__ void cut(Index count, const double* held, const double* di
 
 // The step, scaled to a load if that is positive. Sum: slope of the energy; largest: pressure of `cut` over the load.
 extern "C" __global__ void scale(Index count, const double* held, const double* residual, const double* carried,
-                                 double load, double* trial, double* change, SUMS) {
+                                 double load, double* trial, double* change, SUM_ARGUMENTS) {
     Totals<1, 1> totals;
     const double ratio = load > 0 ? carried[0] / load : 1;
     totals.largest(0, ratio);
@@ -223,7 +223,7 @@ extern "C" __global__ void scale(Index count, const double* held, const double* 
 
 // Sum: curvature of the energy; largest: whether a cell is emptied, and part of its pressure that a cell loses.
 extern "C" __global__ void line_search(Index count, const double* held, const double* trial, const double* change,
-                                       const double* response, const Index* cells, SUMS) {
+                                       const double* response, const Index* cells, SUM_ARGUMENTS) {
     Totals<1, 2> totals;
     EACH_ELEMENT {
         const double h = held[i], c = change[i];
@@ -264,7 +264,7 @@ extern "C" __global__ void block_sums(Index count, const double* held, const dou
 
 // Sums: load times displacement, squared load over the free cells, and free cells of full blocks.
 extern "C" __global__ void spot_sums(Index count, const double* loads, const double* displaced, const double* free,
-                                     double full, SUMS) {
+                                     double full, SUM_ARGUMENTS) {
     Totals<3> totals;
     EACH_ELEMENT {
         totals.add(0, loads[i] * displaced[i]);
@@ -304,7 +304,7 @@ extern "C" __global__ void join(Index count, const float* field, double factor, 
 
 // Residual that a search direction `eased` removes. Sum: its product with the direction.
 extern "C" __global__ void respond(Index count, const double* displaced, const double* eased, const double* free,
-                                   double local, double* response, SUMS) {
+                                   double local, double* response, SUM_ARGUMENTS) {
     Totals<1> totals;
     EACH_ELEMENT {
         response[i] = free[i] * (displaced[i] + local * eased[i]);
@@ -313,13 +313,13 @@ extern "C" __global__ void respond(Index count, const double* displaced, const d
     totals.finish(parts, ended, results);
 }
 
-// An iteration of the conjugate gradients of Chronopoulos and Gear. Sum: residual times preconditioned residual, which is
-// also given from the last step, the one before and the first; largest: length of the step. A step has no length if the
-// sum is small already.
+// An iteration of the conjugate gradients of Chronopoulos and Gear. Sum: residual times preconditioned residual, which
+// is also given from the last step, the one before and the first; largest: length of the step. A step has no length if
+// the sum is small already.
 extern "C" __global__ void step(Index count, const double* response, const double* free, double local, double own,
                                 double part, const double* curvature, const double* last, const double* before,
                                 const double* first, double enough, double* found, double* search, double* moved,
-                                double* left, double* eased, double* loads, SUMS) {
+                                double* left, double* eased, double* loads, SUM_ARGUMENTS) {
     Totals<1, 1> totals;
     const double ratio = before[0] > 0 ? last[0] / before[0] : 0;
     const double bend = curvature[0] - (ratio > 0 ? ratio * last[0] / last[1] : 0);

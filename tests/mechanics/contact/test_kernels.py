@@ -26,7 +26,7 @@ def kernels(tmp_path_factory):
     source = Path(kernels_of_a_gpu.__file__).with_suffix(".cu").read_text()
     parts = [Path(__file__).with_name("cuda.h").read_text(), source.replace('extern "C" __global__', "static")]
     for name, parameters in re.findall(r"__global__ void (\w+)\((.*?)\) \{", source, re.DOTALL):
-        names = ", ".join(re.findall(r"(\w+)(?:,|$)", parameters)).replace("SUMS", "parts, ended, results")
+        names = ", ".join(re.findall(r"(\w+)(?:,|$)", parameters)).replace("SUM_ARGUMENTS", "parts, ended, results")
         parts.append(f'extern "C" void run_{name}(int blocks, int threads, {parameters}) {{')
         parts.append(f"run(blocks, threads, [=] {{ {name}({names}); }}); }}")
     flags = ["-x", "c++", "-ffp-contract=off", "-pthread", "-shared", "-fPIC"]
