@@ -109,8 +109,9 @@ for name in ("rfftn", "irfftn", "rfft", "irfft", "fft", "ifft", "dctn", "idctn")
     setattr(fft, name, on_device(getattr(scipy.fft, name)))
 
 
-#: One device with 8 GiB, all of it free.
-cuda = SimpleNamespace(runtime=SimpleNamespace(getDeviceCount=lambda: 1, memGetInfo=lambda: (8 << 30, 8 << 30)))
+#: One device with 8 GiB, all of it free; it stands in for the libraries of CUDA too.
+runtime = SimpleNamespace(getDeviceCount=lambda: 1, memGetInfo=lambda: (8 << 30, 8 << 30), getVersion=lambda: 13000)
+cuda = SimpleNamespace(runtime=runtime, nvrtc=runtime, cufft=runtime)
 
 
 def get_default_memory_pool():

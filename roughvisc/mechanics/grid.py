@@ -68,18 +68,20 @@ def arrays_of(device: str) -> Any:
     Raises
     ------
     InputError
-        If CuPy is not installed or finds no GPU.
+        If CuPy is not installed or finds no GPU, or not the libraries of CUDA.
     """
     if device == "cpu":
         return np
     try:
         import cupy
 
+        for library in (cupy.cuda.nvrtc, cupy.cuda.cufft):
+            library.getVersion()  # loads it
         if cupy.cuda.runtime.getDeviceCount() > 0:
             return cupy
         problem = "CuPy finds none on this machine"
-    except (ImportError, RuntimeError) as error:  # RuntimeError: of the CUDA driver
-        problem = str(error)
+    except (ImportError, RuntimeError) as error:  # RuntimeError: of the libraries and the driver of CUDA
+        problem = str(error).splitlines()[0]
     expected = f"'cpu', or a GPU with CuPy, pip install 'roughvisc[gpu]' ({problem})"
     raise InputError(key="device", found="gpu", expected=expected)
 

@@ -1,6 +1,8 @@
 """``device = "gpu"``: a stand-in for CuPy gives the results of NumPy to rounding; without a GPU a run is refused."""
 
 import sys
+from functools import partial
+from importlib import import_module
 from types import SimpleNamespace
 
 import device
@@ -117,11 +119,19 @@ def test_surface__that_exceeds_the_memory_of_the_device_is_refused(monkeypatch):
         rv.simulate(large, ZENER, PRESS, boundary="periodic", numerics=GPU, progress=False)
 
 
-NO_DEVICE = SimpleNamespace(cuda=SimpleNamespace(runtime=SimpleNamespace(getDeviceCount=lambda: 0)))
+#: Parts of CuPy that miss something, and the complaint.
+BROKEN = [
+    (None, "roughvisc[gpu]"),
+    ({"runtime": SimpleNamespace(getDeviceCount=lambda: 0)}, "finds none on this machine"),
+    ({"nvrtc": SimpleNamespace(getVersion=partial(import_module, "libnvrtc"))}, "(No module named 'libnvrtc')"),
+]
 
 
-@pytest.mark.parametrize(("cupy", "expected"), [(None, "roughvisc[gpu]"), (NO_DEVICE, "finds none on this machine")])
-def test_command__without_a_device_ends_with_status_2_and_writes_nothing(monkeypatch, tmp_path, capsys, cupy, expected):
+@pytest.mark.parametrize(("parts", "expected"), BROKEN)
+def test_command__without_a_device_ends_with_status_2_and_writes_nothing(
+    monkeypatch, tmp_path, capsys, parts, expected
+):
+    cupy = parts and SimpleNamespace(cuda=SimpleNamespace(**(vars(device.cuda) | parts)))
     monkeypatch.setitem(sys.modules, "cupy", cupy)
     study = tmp_path / "study.toml"
     study.write_text(BALL)

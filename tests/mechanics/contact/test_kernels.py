@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from roughvisc.mechanics.contact import kernels as kernels_of_a_gpu
@@ -57,12 +57,11 @@ def same(kernels, call):
     """Compare what a call gives with the kernels and with the passes of NumPy, and return the latter."""
     found, expected = call(kernels), call(passes)
     for one, other in zip(found, expected, strict=True):
-        other = np.asarray(other, dtype=float)
-        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * float(abs(other).max(initial=0)))
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * float(np.max(np.abs(other), initial=0)))
     return expected
 
 
-@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=50, deadline=None)
 @given(
     seed=st.integers(0, 10**6),
     shape=st.tuples(st.integers(1, 6), st.integers(1, 20)),
@@ -78,30 +77,20 @@ def test_kernels__are_the_passes_of_numpy(kernels, seed, shape, under_load, part
     present = (pressure > 0) | (random.random(size) > 0.3) if partial else None
     given = pressure, separation, gap, np.arange(size), level, under_load, present
     cells, held, residual, *_ = same(kernels, lambda one: one.measure(*given)[:-1])
-    if not cells.size:
-        return
+    assume(cells.size > 0)
     old_cells = np.sort(random.choice(size, random.integers(1, size + 1), replace=False))
     last = (old_cells, random.normal(size=old_cells.size), response, 0.7) if old else None
-
-    def on_grid(values, places):
-        return np.bincount(places, values, size)
-
     direction = random.normal(size=cells.size)
-    rest = residual, last, on_grid, cells, under_load
+    rest = residual, last, passes.Scatter(np.zeros(size)), cells, under_load
     direction, _ = same(kernels, lambda one: one.conjugate(direction.copy(), *rest))
     load = 1.3 if under_load else None
     trial, change, _ = same(kernels, lambda one: one.cut_step(held, direction, residual, 0.3, load))
     for minimum in (0.2, 0.8, 1.5, 20.0):
         slope = -minimum * abs(float(change @ response[cells]))
         same(kernels, lambda one, slope=slope: one.line_search(held, trial, change, slope, response, cells))
-    for fraction in (0.4, 1.0):
-        fields = {one: (pressure.copy(), separation.copy()) for one in (kernels, passes)}
-        for one, both in fields.items():
-            one.advance(*both, cells, (held, trial, change), response, fraction)
-        same(kernels, fields.get)
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=30, deadline=None)
 @given(
     seed=st.integers(0, 10**6),
     shape=st.tuples(st.integers(8, 50), st.integers(8, 50)),
@@ -139,7 +128,6 @@ def test_kernels__solve_contact_as_numpy_does(kernels, monkeypatch, given, bound
         monkeypatch.setattr(solver, "host", one)
         grid = Grid((nx, ny), (0.9, 1.1), boundary)
         found.append(solver.solve_contact(grid, gap, tolerance=1e-10, present=present, **given))
-    for name in ("pressure", "displacement", "approach", "load"):
-        one, other = (np.asarray(getattr(state, name)) for state in found)
-        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * float(abs(other).max()))
+    for one, other in zip(*(state[:4] for state in found), strict=True):  # pressure, displacement, approach, load
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * float(np.abs(other).max()))
     assert abs(found[0].iterations - found[1].iterations) <= 1
