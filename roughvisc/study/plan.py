@@ -39,7 +39,7 @@ from roughvisc.experiment.resources import (
 )
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.mechanics.contact.solver import solve_contact
-from roughvisc.mechanics.grid import Grid
+from roughvisc.mechanics.grid import Grid, arrays_of, to_host
 from roughvisc.mechanics.program import Program
 from roughvisc.settings import Problem
 from roughvisc.study.case import Case, labels_of, parameters_of, read_cases
@@ -338,20 +338,21 @@ def timed_convolution(rows: Rows, touching: float) -> float:
     if isinstance(rows, LoadingRows):
         grid, gap, present = rows.scene.grid, rows.scene.gap, rows.scene.present
     else:
-        height = rows.problem.height
-        gap, present = float(height.max()) - height.values, None
-        grid = Grid((gap.shape[0], gap.shape[1]), spacing(height), "periodic")
-    guess = np.maximum(np.quantile(gap, min(max(touching, 0.01), 0.9)) - gap, 0.0)
+        height, xp = rows.problem.height, arrays_of(rows.problem.settings.device)
+        gap, present = xp.asarray(float(height.max()) - height.values), None
+        grid = Grid((gap.shape[0], gap.shape[1]), spacing(height), "periodic", xp=xp)
+    gaps = to_host(gap)
+    guess = np.maximum(np.quantile(gaps, min(max(touching, 0.01), 0.9)) - gaps, 0.0)
     if present is not None:
-        guess *= present
+        guess *= to_host(present)
     if not guess.any():
         guess = np.ones(gap.shape)
-    times = []
+    load, start, times = float(guess.sum()), grid.xp.asarray(guess), []
     for _ in range(2):  # the first solve allocates memory
         began, before = time.thread_time(), grid.convolutions
         with suppress(ConvergenceError):
             few = {"tolerance": 1e-11, "max_iterations": _ITERATIONS, "present": present}
-            solve_contact(grid, gap, load=float(guess.sum()), start=guess, **few)
+            solve_contact(grid, gap, load=load, start=start, **few)
         times.append((time.thread_time() - began) / max(grid.convolutions - before, 1))
     return min(times)
 

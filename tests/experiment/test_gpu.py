@@ -11,7 +11,7 @@ import pytest
 from samples import GEL as ZENER
 from samples import HOLED
 from samples import SMALL_ROUGH as ROUGH
-from support import BALL
+from support import BALL, FRICTION
 
 import roughvisc as rv
 from roughvisc.cli import main
@@ -142,3 +142,17 @@ def test_command__without_a_device_ends_with_status_2_and_writes_nothing(
     assert "device" in said
     assert expected in said
     assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
+
+
+PERIODIC = BALL.replace("[24, 21]", "[150, 140]").replace("free", "periodic")  # longer than the coarse run of a plan
+
+
+@pytest.mark.parametrize("study", [PERIODIC, FRICTION.replace("[26, 21]", "[60, 50]")])
+def test_plan__on_the_device_is_that_of_the_processor(monkeypatch, tmp_path, study):
+    device.install(monkeypatch)
+    found = []
+    for where in ("cpu", "gpu"):
+        (tmp_path / "study.toml").write_text(study.replace("[solve]", f'[solve]\ndevice = "{where}"'))
+        found.append(rv.plan(tmp_path / "study.toml"))
+    for name in ("steps", "convolutions", "contact_fraction"):
+        np.testing.assert_allclose(*(plan[name] for plan in found), rtol=0.01)
