@@ -81,7 +81,7 @@ class Recorder:
             self._arrays.append(dict(row.fields))
 
     def field(self, name: str, rows: Sequence[int], shape: tuple[int, int]) -> Any:
-        """Return a field of some rows, an array (rows, x, y). It no longer belongs to the recorder."""
+        """Return a field of some rows, an array (rows, x, y). The recorder does not keep it."""
         frames = np.empty((len(rows), *shape))
         for frame, row in zip(frames, rows, strict=True):
             frame[...] = self._arrays[row].pop(name)  # frees its memory

@@ -300,12 +300,10 @@ class LoadingRows(Rows):
             if "displacement" in names or "gap" in names:
                 beyond["displacement"] = domain.displacement(effective)
                 beyond["gap"] = np.maximum(profile.gap + beyond["displacement"] - point.approach, 0.0)
-        fields = dict[str, Any]()
+        fields = {}
         for name in names:
-            if name == "pressure" and isinstance(point.stored_pressure, Packed):
-                fields[name] = point.stored_pressure.on_host()
-            else:
-                fields[name] = to_host({"pressure": pressure, "displacement": displacement, "gap": gap}[name])
+            found = {"pressure": point.stored_pressure, "displacement": displacement, "gap": gap}
+            fields[name] = to_host(found[name])
             if beyond:
                 beyond[name][domain.cells] = fields[name]
                 fields[name] = beyond[name]

@@ -14,7 +14,7 @@ import numpy as np
 from roughvisc.errors import TooLargeError
 from roughvisc.experiment.accuracy import memory_of
 from roughvisc.mechanics.body import Body
-from roughvisc.mechanics.grid import KEPT_FREE, arrays_of
+from roughvisc.mechanics.grid import LARGEST_REUSED, arrays_of
 from roughvisc.mechanics.memory import LayerMemory, Memory
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.stepping import PACKED_FROM, SOFT
@@ -78,8 +78,8 @@ _SURFACE, _MADE = 2.1, 4.0
 _SOLVE, _IN_CONTACT = 8.4, 13.5
 #: Fields of operator and spectrum, and of both on the whole surface if the domain is smaller.
 _TRANSFORMS, _WHOLE = {"periodic": 1.5, "mirror": 1.5, "free": 6.0}, 6.0
-#: Work areas of the plans of cuFFT on a GPU, over the fields of the transforms; not measured.
-_WORK_AREAS = 2.0
+#: Memory of the transforms over these fields: cuFFT also has work areas (not measured).
+_PLANS = {"cpu": 1.0, "gpu": 3.0}
 #: Number of solutions (pressure and displacement) and number of copies of each exponential at the peak. First without
 #: memory; then for a pair of steps with its coarse solution and first guesses; last for a pair of soft steps, with the
 #: ends of its steps and the exponentials of the step before.
@@ -129,15 +129,15 @@ def march_bytes(
     kept = _SPECTRUM[settings.boundary] if layered else 1.0 if part == 1 else 2.0
     crept = memory.glassy + float(memory.compliances[np.isfinite(memory.times)].sum())
     solutions, copies = _ELASTIC if memory.is_elastic else _SOFT_PAIR if crept >= SOFT * memory.glassy else _PAIR
-    transforms = _TRANSFORMS[settings.boundary] * (1 + _WORK_AREAS * (settings.device == "gpu"))
-    solved = _SOLVE + transforms + _IN_CONTACT * contact
+    solved = _SOLVE + _TRANSFORMS[settings.boundary] * _PLANS[settings.device] + _IN_CONTACT * contact
     is_packed = part * cells >= PACKED_FROM and contact < 0.5  # a pressure takes 18 bytes per contact cell (measured)
     solved += solutions * ((2.25 * contact if is_packed else 1.0) + kept) + copies * kept * exponentials
     if layered:
         solved += 0.5 * kept * (exponentials + 1)  # symbols
     frames, surface = rows * len(settings.fields), _SURFACE + (_WHOLE if part < 1 else 0.0)
-    dense = frames - rows * (is_packed and part == 1 and "pressure" in settings.fields)
-    copied = frames + (dense if 8 * cells <= KEPT_FREE else 1.0)
+    packed = rows if is_packed and part == 1 and "pressure" in settings.fields else 0.0
+    dense = frames - packed
+    copied = frames + (dense if 8 * cells <= LARGEST_REUSED else 1.0)
     return 8.0 * cells * (surface + part * solved / 2 + max(part * solved / 2 + dense, copied))
 
 

@@ -42,10 +42,10 @@ THREADED_FROM = 1024**2
 APART = 16
 #: Cells a side of a block of the coarse grid.
 COARSE = 8
-#: Once glibc has freed an array of almost 32 MiB, it keeps smaller ones for reuse. Otherwise it returns each to the
-#: system, and a solve takes up to 15 % more time (measured at 256 and 512 squared). [byte]
-KEPT_FREE = 31 << 20
-np.empty(KEPT_FREE, np.uint8)
+#: Size up to which glibc keeps the memory of a freed array for reuse, once it has freed an array of this size. [byte]
+#: Otherwise it returns the memory to the system, and a solve takes up to 15 % more time (at 256 and 512 squared).
+LARGEST_REUSED = 31 << 20
+np.empty(LARGEST_REUSED, np.uint8)
 
 
 def namespace(array: Array) -> Any:
@@ -68,7 +68,7 @@ def arrays_of(device: str) -> Any:
     Raises
     ------
     InputError
-        If CuPy is not installed or finds no GPU, or not the libraries of CUDA.
+        If CuPy is not installed, or finds no GPU or no libraries of CUDA.
     """
     if device == "cpu":
         return np
@@ -86,8 +86,8 @@ def arrays_of(device: str) -> Any:
     raise InputError(key="device", found="gpu", expected=expected)
 
 
-def to_host(array: Array) -> np.ndarray:
-    """Return an array of NumPy: the array itself, or a copy of an array on a device."""
+def to_host(array: Array) -> Any:
+    """Return an array of NumPy: the array itself, or a copy of an array on a device. A packed field stays packed."""
     return array if isinstance(array, np.ndarray) else array.get()
 
 

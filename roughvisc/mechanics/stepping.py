@@ -183,7 +183,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class Packed:
-    """Field that is zero outside the contact. NumPy takes it for an array.
+    """Field that is zero outside the contact. NumPy accepts it as an array.
 
     Attributes
     ----------
@@ -210,12 +210,12 @@ class Packed:
         field[self.cells] = self.values
         return field.reshape(self.shape)
 
-    def on_host(self) -> Packed:
-        """Return the field with arrays of NumPy."""
+    def get(self) -> Packed:
+        """Return the field with its arrays on the host."""
         return Packed(self.shape, to_host(self.cells), to_host(self.values))
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        return np.asarray(self.on_host().field(), dtype)
+        return np.asarray(self.get().field(), dtype)
 
 
 @dataclass(frozen=True)

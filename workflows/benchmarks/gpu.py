@@ -10,8 +10,8 @@ out when the time is used up. Needs CuPy (``roughvisc[gpu]``).
 """
 
 import argparse
-import subprocess
-import sys
+import multiprocessing
+import signal
 import time
 from functools import partial
 from pathlib import Path
@@ -19,9 +19,12 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import xarray as xr
+from memory import case_of
 
 import roughvisc as rv
 from roughvisc.mechanics.grid import arrays_of, transforms
+from roughvisc.study.case import vary
+from roughvisc.study.execution.run import run_case
 
 TOLERANCE = 1e-3
 COMMON = {"tolerance": TOLERANCE, "fields": ("pressure",), "grid_error": False, "progress": False}
@@ -29,40 +32,6 @@ GPU, CPU = {"numerics": rv.Numerics(device="gpu")}, {"threads": 1}
 RUBBER = rv.zener(shear_modulus=3e6, kelvin_modulus=1e6, kelvin_viscosity=1e5)
 #: Cells a side up to which a scene also runs on the CPU.
 COMPARED = 1024
-#: Study of the run that is killed.
-STUDY = """
-title = "killed"
-[surface]
-generate = "self_affine"
-size = "1 mm"
-shape = [1100, 1050]
-hurst = 0.8
-rms_slope = 0.1
-rolloff = "0.25 mm"
-shortcut = "16 um"
-seed = 1
-[material]
-model = "zener"
-shear_modulus = "3 MPa"
-kelvin_modulus = "1 MPa"
-kelvin_viscosity = "0.1 MPa s"
-[[program]]
-pressure = "7 kPa"
-over = "10 ms"
-[[program]]
-hold = "0.5 s"
-[solve]
-boundary = "periodic"
-device = "{device}"
-[keep]
-times = 5
-"""
-#: Program that runs a study and writes a checkpoint after each step.
-RUN = """
-import sys, roughvisc as rv
-from roughvisc.study.execution.run import run_case
-run_case(rv.read_study(sys.argv[1]), sys.argv[2], checkpoint_seconds=0)
-"""
 
 
 def rough(cells):
@@ -88,34 +57,45 @@ def friction(height, **device):
 SCENES = {"creep": creep, "elastic": elastic, "friction": friction}
 
 
+def run_and_save(device, folder):
+    """Run a case with a checkpoint after each step."""
+    case = vary(case_of(1100, "zener"), {"solve.device": device, "solve.tolerance": TOLERANCE})
+    run_case(case, folder, checkpoint_seconds=0)
+
+
 def resume(device="gpu", kills=3):
     """Kill a run after some steps, several times, and return the variables whose bits differ from those of a whole run.
 
     Raises
     ------
     RuntimeError
-        If a run ends before it can be killed.
+        If a run fails, or ends before it can be killed.
     """
-    with TemporaryDirectory() as name:
-        folder = Path(name)
-        (folder / "study.toml").write_text(STUDY.format(device=device))
 
-        def start(out):
-            (folder / out).mkdir(exist_ok=True)
-            return subprocess.Popen([sys.executable, "-c", RUN, folder / "study.toml", folder / out])
+    def started(out):
+        out.mkdir(exist_ok=True)
+        process = multiprocessing.get_context("spawn").Process(target=run_and_save, args=(device, out))
+        process.start()
+        return process
 
-        start("whole").wait()
+    def ended(process, status):
+        process.join()
+        if process.exitcode != status:
+            raise RuntimeError(f"a run ended with status {process.exitcode}: expected {status}")
+
+    with TemporaryDirectory() as folder:
+        whole, killed = Path(folder, "whole"), Path(folder, "killed")
+        ended(started(whole), 0)
         for _ in range(kills):
-            process, saved = start("killed"), set()
-            while len(saved) < 3 and process.poll() is None:
-                saved |= {path.stat().st_mtime_ns for path in folder.glob("killed/*/state.npz")}
+            process, saved = started(killed), set()
+            while len(saved) < 3 and process.is_alive():
+                saved |= {path.stat().st_mtime_ns for path in killed.glob("*/state.npz")}
             process.kill()
-            if process.wait() == 0:
-                raise RuntimeError("the run ended before it was killed")
-        start("killed").wait()
-        whole, killed = (xr.load_dataset(next((folder / out).glob("*.nc"))) for out in ("whole", "killed"))
-        names = set(whole.variables) - {"wall_time"}
-        return sorted(one for one in names if whole[one].values.tobytes() != killed[one].values.tobytes())
+            ended(process, -signal.SIGKILL)
+        ended(started(killed), 0)
+        one, other = (xr.load_dataset(next(out.glob("*.nc"))) for out in (whole, killed))
+        names = set(one.data_vars) - {"wall_time"}
+        return sorted(name for name in names if one[name].values.tobytes() != other[name].values.tobytes())
 
 
 def refusal(xp):
@@ -123,7 +103,7 @@ def refusal(xp):
     taken = xp.empty(int(xp.cuda.runtime.memGetInfo()[0] - 2**30), np.uint8)
     try:
         creep(rough(4096), **GPU)
-    except rv.InputError as error:
+    except rv.TooLargeError as error:
         return str(error)
     finally:
         del taken
@@ -181,7 +161,8 @@ if __name__ == "__main__":
     parser.add_argument("--sizes", type=int, nargs="+", default=[512, 1024, 2048, 4096, 8192])
     parser.add_argument("--seconds", type=float, default=240.0)
     given = parser.parse_args()
-    print("bits that differ after kills:", *(resume() or ["none"]))
-    print("refused:", refusal(arrays_of("gpu")), flush=True)
+    device = arrays_of("gpu")
+    print("variables whose bits differ after kills:", *(resume() or ["none"]))
+    print("refused:", refusal(device), flush=True)
     for row in measure(given.sizes, given.seconds):
         print("  ".join(f"{k} {v:.3g}" if isinstance(v, float) else f"{k} {v}" for k, v in row.items()), flush=True)

@@ -42,11 +42,15 @@ def measure(sides, materials=tuple(MATERIALS), boundaries=tuple(BOUNDARIES)):
                     yield pool.submit(one, side, material, boundary).result()
 
 
+def case_of(side, material):
+    """Return the case of a material on a square surface."""
+    surface = CASE["surface"] | {"shape": [side, side], "shortcut": max(1.6e-5, 4e-3 / side), "seed": 1}
+    return Case.from_json(json.dumps(CASE | {"surface": surface, "material": MATERIALS[material]}))
+
+
 def one(side, material, boundary):
     """Return the peak memory of this process, and the estimate for the case with its contact. [byte]"""
-    surface = CASE["surface"] | {"shape": [side, side], "shortcut": max(1.6e-5, 4e-3 / side), "seed": 1}
-    case = vary(Case.from_json(json.dumps(CASE | {"surface": surface, "material": MATERIALS[material]})), {})
-    case = vary(case, BOUNDARIES[boundary])
+    case = vary(case_of(side, material), BOUNDARIES[boundary])
     with tempfile.TemporaryDirectory() as folder:
         with open_result(run_case(case, folder)) as ds:
             contact = float(ds.roughvisc.steps.contact_area_counted.max()) / nominal_area(ds)

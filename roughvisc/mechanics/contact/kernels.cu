@@ -1,6 +1,6 @@
 // Kernels of roughvisc.mechanics.contact.kernels: the passes of the contact solver on a GPU.
 //
-// Each thread goes through some of the elements i < count. A kernel with sums ends with Totals::finish(), which adds up
+// Each thread works on some of the elements i < count. A kernel with sums ends with Totals::finish(), which adds up
 // in the same order in each run, so that the sums have the same bits.
 
 typedef long long Index;
@@ -40,7 +40,7 @@ static __device__ double combined(double* shared, double value, bool is_sum) {
     return shared[0];
 }
 
-// Sums, followed by largest values, of the elements.
+// Sums over the elements, followed by largest values.
 template <int sums, int maxima = 0>
 struct Totals {
     double values[sums + maxima];
@@ -103,8 +103,8 @@ static __device__ bool is_free(double pressure, double separation, double level,
 
 // Number of free cells of each segment. Sums: free cells, contact cells, pressure, separation, pressure times
 // separation and times gap; largest: approach, pressure, separation, negative separation.
-extern "C" __global__ void find(Index count, const double* pressure, const double* separation, const double* gap,
-                                const bool* present, Index is_whole, Index ny, Index my, const double* contact,
+extern "C" __global__ void find(Index count, const double* pressure, const double* separation, const bool* present,
+                                Index is_whole, Index ny, Index my, const double* gap, const double* contact,
                                 double given, Index under_load, Index* numbers, SUM_ARGUMENTS) {
     Totals<6, 4> totals;
     const double level = under_load ? contact[0] / contact[1] : given;
@@ -131,9 +131,9 @@ extern "C" __global__ void find(Index count, const double* pressure, const doubl
 }
 
 // The free cells in ascending order, their pressure, and their separation without a mean.
-extern "C" __global__ void gather(Index count, const double* pressure, const double* separation, const double* gap,
-                                  const bool* present, Index is_whole, Index ny, Index my, double level, double mean,
-                                  const Index* ends, Index* cells, double* held, double* residual) {
+extern "C" __global__ void gather(Index count, const double* pressure, const double* separation, const bool* present,
+                                  Index is_whole, Index ny, Index my, double level, double mean, const Index* ends,
+                                  Index* cells, double* held, double* residual) {
     EACH_ELEMENT {
         Index k = i ? ends[i - 1] : 0;
         EACH_CELL_OF_SEGMENT {
@@ -176,7 +176,7 @@ extern "C" __global__ void against_last(Index count, const double* direction, co
 }
 
 // Makes the direction conjugate to the last step, if there is one and the direction still descends then. Sum: absolute
-// direction before.
+// values of the direction before this change.
 extern "C" __global__ void turn(Index count, double* direction, const double* last, const Index* cells,
                                 const double* sums, double curvature, Index under_load, SUM_ARGUMENTS) {
     Totals<1> totals;

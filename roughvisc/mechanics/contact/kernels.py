@@ -41,7 +41,7 @@ def kernel(name: str) -> Any:
 
 @cache
 def space() -> tuple[Array, Array]:
-    """Return space for the sums of the blocks of threads, and for the number of blocks that have ended."""
+    """Return memory for the sums of the blocks of threads, and for the number of blocks that have ended."""
     return cupy.empty(SUMS * BLOCKS), cupy.zeros(1, np.uint32)
 
 
@@ -66,9 +66,9 @@ def measure(
     my = -(-ny // COARSE)
     segments = gap.shape[0] * my
     numbers = cupy.empty(segments, np.int64)
-    surface = pressure, separation, gap, numbers if present is None else present, int(present is None), ny, my
+    surface = pressure, separation, numbers if present is None else present, int(present is None), ny, my
     contact = summed("contact_level", cells.size, pressure, separation, cells)
-    sums = summed("find", segments, *surface, contact, level, int(under_load), numbers).tolist()
+    sums = summed("find", segments, *surface, gap, contact, level, int(under_load), numbers).tolist()
     free, touching, total, separations, weighted, undeformed, level, highest, most, least = sums
     count, ends = int(free), cupy.cumsum(numbers)
     cells, held, residual = cupy.empty(count, np.int64), cupy.empty(count), cupy.empty(count)
@@ -107,7 +107,7 @@ def spot_sums(loads: Array, displaced: Array, free: Array, full: float) -> tuple
 
 
 def preconditioned(grid: Grid, found: Free, waves: LongWaves | None, on_grid: Scatter) -> Array:
-    """Return the pressure that approximately removes the residual, at the free cells."""
+    """Return a pressure at the free cells that approximately removes the residual."""
     if waves is None:
         return passes.preconditioned(grid, found, None, on_grid)
     cells, count, size = found.cells, found.cells.size, found.size

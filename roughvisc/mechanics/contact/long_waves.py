@@ -11,7 +11,7 @@ Array = Any  # an array of NumPy or CuPy, depending on the grid
 
 #: Largest part of free cells for blocks.
 SPARSE = 0.6
-#: Part of its cells from which a block is full.
+#: A block counts as full if more than this part of its cells is free.
 FULL = 0.98
 #: Blocks pay if the number of blocks along a side, times the part of the free cells that lies in partly free blocks, is
 #: at least this. Within a contact spot that is wider than a block, blocks slow the iteration.

@@ -111,7 +111,7 @@ def measure(
 
 
 def preconditioned(grid: Grid, found: Free, waves: LongWaves | None, on_grid: Scatter) -> Array:
-    """Return the pressure that approximately removes the residual, at the free cells.
+    """Return a pressure at the free cells that approximately removes the residual.
 
     Parameters
     ----------
