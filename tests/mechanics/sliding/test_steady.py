@@ -119,9 +119,3 @@ def test_loss_tangent_of_ten_thousand__is_solved_despite_a_preconditioner_in_sin
     apart = float(np.abs(found.pressure - tight.pressure).sum() / tight.pressure.sum())
     assert apart < float(found.stated_error[0]) < 1e-3
     assert float(found.friction_force[0]) == pytest.approx(float(tight.friction_force[0]), rel=1e-3)
-
-
-def test_units__do_not_matter():
-    metres = slid(ROUGH, rubber(), 0.1, LOAD)
-    microns = slid(ROUGH * 1e6, rubber(), 0.1e6, LOAD * 1e12, side=PERIOD * 1e6)
-    assert microns.power_force / 1e12 == pytest.approx(metres.power_force, rel=1e-8)
