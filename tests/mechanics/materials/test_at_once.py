@@ -6,6 +6,7 @@ References: a flat punch sinks by its load times the compliance, on any grid; a 
 import numpy as np
 import pytest
 from references.half_space import punch_approach
+from samples import OF_EACH_KIND
 
 import roughvisc as rv
 
@@ -41,6 +42,21 @@ def test_table__jumps_by_what_is_there_at_once(first):
     found, ds = sunk(table, rv.Program().load(2.0, over=0).hold(10.0), times, tolerance=1e-2)
     assert 0 < ds.attrs["series_error"] <= 1e-3
     assert found == pytest.approx(2.0 * table.contact_compliance(times), rel=5e-3, abs=0)
+
+
+NOT_SERIES = [name for name, material in OF_EACH_KIND.items() if not isinstance(material, rv.Prony)]
+
+
+@pytest.mark.filterwarnings("ignore:.*table:UserWarning")
+@pytest.mark.parametrize("name", [*NOT_SERIES, "table", "noisy table"])
+def test_jump_alone__is_to_the_instantaneous_compliance(name):
+    """No time passes: a material without this compliance has not moved yet."""
+    material = OF_EACH_KIND[name]
+    found, ds = sunk(material, rv.Program().load(2.0, over=0), None)
+    compliance = float(material.contact_compliance(0.0))
+    assert found.tolist() == pytest.approx([2.0 * compliance], rel=1e-4, abs=0)
+    assert ds.force.values.tolist() == [2.0 if compliance > 0 else 0.0]
+    assert ds.attrs["series_error"] == 0
 
 
 @pytest.mark.parametrize("material", [rv.power_law(0.3, 1.0, 0.1), rv.power_law(0.0, 1.0, 0.5)], ids=str)

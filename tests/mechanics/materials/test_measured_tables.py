@@ -36,7 +36,7 @@ def stated_misfit(material):
 
 
 @pytest.mark.parametrize("name", CREEP)
-@pytest.mark.parametrize(("rows", "most"), [(7, 0.03), (13, 6e-3), (25, 1e-3), (60, 1e-3)])
+@pytest.mark.parametrize(("rows", "most"), [(7, 0.03), (13, 6e-3), (25, 1e-3), (1500, 1e-3)])
 def test_creep_table__finds_the_creep_between_the_rows(name, rows, most):
     """From a row a decade on; the rows themselves are met as stated."""
     t = np.geomspace(1e-3, 1e3, rows)
