@@ -30,7 +30,7 @@ def test_stiff_plate__is_solved():
         for one in (1e-3, 1e-5)
     )
     off = np.abs(loose.pressure - tight.pressure).sum() / tight.pressure.sum()
-    assert 0.8 * off <= loose.stated_error[-1] <= 1e-3
+    assert 0.8 * off <= loose.stated_error[-1] <= min(10 * off, 1e-3)
     assert loose.approach.values == pytest.approx(tight.approach.values, rel=1e-6)
 
 
@@ -60,8 +60,8 @@ def test_every_requested_time__has_a_row():
 
 
 def test_stated_error__covers_rows_after_a_jump_that_is_not_kept():
-    """At constant approach the contact stays, and the force relaxes as the modulus; it falls to 1/3000 here."""
-    equilibrium, moduli, relaxation = 1e3, (3e6, 3e5), (1e-2, 1.0)
+    """At constant approach the contact stays, and the force relaxes as the modulus: to 1/6000, over ten decades."""
+    equilibrium, moduli, relaxation = 1e3, (3e6, 3e6, 3e5), (1e-9, 1e-2, 1.0)
     times = np.array([1.0, 2.0, 10.0])
     program = rv.Program().approach(5e-6, over=0).hold(10.0)
     settings = {"fields": (), "progress": False}
@@ -73,6 +73,7 @@ def test_stated_error__covers_rows_after_a_jump_that_is_not_kept():
     error = np.abs(ds.force.values - expected) / np.maximum.accumulate(expected)
     assert error.max() > 1e-3
     assert (error <= ds.stated_error.values).all()
+    assert ds.stated_error.values.max() < 10 * error.max()
 
 
 def test_missed_tolerance__gives_one_warning_and_an_attribute():

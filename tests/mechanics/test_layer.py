@@ -42,9 +42,13 @@ def test_kernel__in_free_space_is_the_transform_of_its_response(ratio, relative)
         assert found[cell, 0] - love[cell, 0] == pytest.approx(rest, abs=1e-4 * love[cell, 0], rel=relative)
 
 
-@pytest.mark.parametrize("side", [0.3, 4.0])
-def test_kernel__displacement_by_a_cell_is_that_by_its_nine_parts(side):
-    kernel = elastic((0.5, 0.5), (0.5, 0.1, 0.3), (1.0, 0.1, 8.0))
+#: Thicknesses of two layers.
+FAR_APART = [(0.01, 1.0), (1.0, 0.01)]
+
+
+@pytest.mark.parametrize(("side", "thicknesses"), [(0.3, (0.5, 0.5)), *((4.0, one) for one in FAR_APART)])
+def test_kernel__displacement_by_a_cell_is_that_by_its_nine_parts(side, thicknesses):
+    kernel = elastic(thicknesses, (0.5, 0.1, 0.3), (1.0, 0.1, 8.0))
     whole = kernel.influence((15, 17), (side, 1.3 * side))
     parts = kernel.influence((50, 50), (side / 3, 1.3 * side / 3))
     for i, j in ((0, 0), (2, 1), (14, 5), (3, 15)):
@@ -52,13 +56,16 @@ def test_kernel__displacement_by_a_cell_is_that_by_its_nine_parts(side):
         assert parts[np.ix_(*near)].sum() == pytest.approx(whole[i, j], rel=1e-7)
 
 
-def test_layer__lies_on_another_one():
+@pytest.mark.parametrize("thicknesses", FAR_APART)
+def test_layer__lies_on_another_one(thicknesses):
+    """Waves much shorter than the thinner layer, much longer than the thicker one, and all between."""
     soft, hard, base = rv.elastic(1e6), rv.elastic(1e8), rv.elastic(1e7)
-    both = rv.layer(soft, 1e-4, on=rv.layer(hard, 2e-4, on=base))
-    assert both.thicknesses == (1e-4, 2e-4)
+    both = rv.layer(soft, thicknesses[0], on=rv.layer(hard, thicknesses[1], on=base))
+    assert both.thicknesses == thicknesses
     assert both.materials == (soft, hard, base)
-    exact = 4 * effective_compliance(1e4, both.thicknesses, (0.5, 0.5, 0.5), (1.0, 0.01, 0.1))
-    assert float(both.kernel.transfer(1e4, 0.0)) * 1e4 / 2 == pytest.approx(float(exact), rel=2e-6)
+    q = np.geomspace(1e-8, 1e5, 500)
+    exact = effective_compliance(q, thicknesses, (0.5, 0.5, 0.5), (1.0, 0.01, 0.1))
+    np.testing.assert_allclose(both.kernel.transfer(q, 0.0) * q / 2, 4 * exact, rtol=2e-6)
     assert rv.layer(soft, math.inf, on=base) == rv.Body(soft)
 
 

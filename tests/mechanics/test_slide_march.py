@@ -137,7 +137,8 @@ def test_partial_contact__settles_at_what_steady_sliding_finds(speed):
     assert 0.2 < np.mean(steps[-1].point.pressure > 0) < 0.6
     got = force(found, steps[-1])
     assert got == pytest.approx(exact.power_force, rel=5e-3)
-    assert abs(got - exact.power_force) <= steps[-1].difference.friction
+    off = abs(got - exact.power_force)
+    assert off <= steps[-1].difference.friction < 10 * off
     after = steps[-1]
     by_slopes = float(np.sum(after.point.pressure * slope(found.gap, PERIOD / 128, 0))) * found.grid.cell_area
     assert by_slopes == pytest.approx(got, rel=5e-3)

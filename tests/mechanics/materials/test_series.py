@@ -33,7 +33,7 @@ def test_series__of_smooth_creep_has_few_terms(curve, decades, tolerance, most):
     material = rv.creep(CURVES[curve], poisson=0.1)
     found, error = series(material, shortest, longest, tolerance)
     assert error <= tolerance
-    assert true_error(material, found, shortest, longest) <= 1.1 * error
+    assert 0.5 * error <= true_error(material, found, shortest, longest) <= 1.1 * error
     assert found.glassy == CURVES[curve](0.0)
     assert len(found.times) <= most
     assert found.poisson == 0.1

@@ -89,13 +89,15 @@ def hertz(cells, radius, centre, boundary="free"):
 
 def test_hertz__has_the_stiffness_of_its_exact_radius():
     """Where the gap opens nothing is corrected: the count is too large by as much as the punch is too soft."""
-    rng, off = np.random.default_rng(4), []
+    rng, off, stated = np.random.default_rng(4), [], []
     for radius in 14 + 4 * rng.random(10):
         contact = hertz(42, radius, rng.random(2) - 0.5)
         found = frozen_contact(contact, UNIT)
         assert within(found, 2 * radius) < 1e-2
         off.append(found[0] / (2 * radius) - 1)
+        stated.append(found[1] / (2 * radius))
     assert abs(np.mean(off)) < 2e-3, "nothing systematic"
+    assert np.mean(stated) < 10 * np.mean(np.abs(off))
     assert abs(np.sqrt(contact.sum() / math.pi) / radius - 1) > 5e-3, "which the count is"
 
 
