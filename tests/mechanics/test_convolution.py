@@ -76,6 +76,15 @@ def test_self_influence__is_that_of_a_uniformly_loaded_rectangle(shape):
     assert Grid(shape, (a, b)).self_influence == pytest.approx(expected, rel=1e-12)
 
 
+@BOUNDARIES
+@pytest.mark.parametrize("shape", [(4, 5), (5, 4), (1, 6)])
+def test_self_influence__is_the_mean_over_all_cells(shape, boundary):
+    grid = Grid(shape, (1.3, 0.7), boundary)
+    alone = np.eye(grid.size).reshape(-1, *shape)
+    own = [float((grid.displacement(pressure) * pressure).sum()) for pressure in alone]
+    assert grid.self_influence == pytest.approx(np.mean(own), rel=1e-12)
+
+
 # --------------------------------------------------------------------------------------------------- SciPy and ducc0
 
 

@@ -230,10 +230,13 @@ def nearly_full(kind):
     x, y = (np.arange(n) / n for n in shape)
     wave = 2 - np.cos(2 * np.pi * x)[:, None] - np.cos(2 * np.pi * y)
     operator, gap = Grid(shape, spacing, "periodic"), wave if kind == "wave" else rough_gap(shape, seed=4)
-    return operator, gap, -full_pressure(operator, gap).min() * gap.size
+    if kind != "mirrored":
+        return operator, gap, -full_pressure(operator, gap).min() * gap.size
+    unfolded = np.pad(gap, [(0, n) for n in shape], mode="symmetric")
+    return Grid(shape, spacing, "mirror"), gap, -full_pressure(operator, unfolded).min() * gap.size
 
 
-@pytest.mark.parametrize("kind", ["wave", "rough"])
+@pytest.mark.parametrize("kind", ["wave", "mirrored"])
 @pytest.mark.parametrize("short", [0.3, 0.05, 1e-2, 1e-4])
 def test_given_approach__near_full_contact_has_the_load(kind, short):
     """The energy does not depend on a uniform pressure: the load is checked by itself, or the solver raises."""
@@ -251,9 +254,9 @@ def test_given_approach__near_full_contact_has_the_load(kind, short):
     assert solved == 6 or short < 1e-2
 
 
-@pytest.mark.parametrize("deeper", [0.0, 1e-3])
-def test_given_approach__of_full_contact_does_not_determine_the_load(deeper):
-    operator, gap, _ = nearly_full("rough")
+@pytest.mark.parametrize(("kind", "deeper"), [("rough", 0.0), ("mirrored", 1e-3)])
+def test_given_approach__of_full_contact_does_not_determine_the_load(kind, deeper):
+    operator, gap, _ = nearly_full(kind)
     with pytest.raises(ConvergenceError, match="full contact"):
         solve_contact(operator, gap, approach=gap.mean() * (1 + deeper))
 
@@ -270,7 +273,7 @@ def test_given_approach__has_the_load_if_absent_cells_alone_are_open(absent):
             assert abs(state.load / load - 1) < 1e-3
 
 
-@pytest.mark.parametrize("kind", ["wave", "rough"])
+@pytest.mark.parametrize("kind", ["wave", "mirrored"])
 def test_given_load__near_full_contact_has_the_mean_gap(kind):
     """The approach is that of a loosely solved pressure; what counts is how much is left to full contact."""
     operator, gap, full = nearly_full(kind)
