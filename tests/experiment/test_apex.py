@@ -42,9 +42,14 @@ def test_approach__is_of_second_order_on_even_and_odd_grids(name, parity):
 
 
 def test_highest__is_the_apex_within_the_cells_of_an_unchanged_indenter():
+    """On the border of the first or of the last row along either axis, and outside of it."""
     tip = rv.cone(0.5, 4.0, 8)
-    beside = tip.isel(x=slice(5, None))  # the apex is outside
-    for height, highest in ((tip, 0.0), (tip + 1.0, float(tip.max()) + 1.0), (beside, float(beside.max()))):
+    cases = [(tip, 0.0), (tip + 1.0, float(tip.max()) + 1.0)]
+    for axis in ("x", "y"):
+        cases += [(tip.isel({axis: rows}), 0.0) for rows in (slice(4, None), slice(None, 4))]
+        beside = [tip.isel({axis: rows}) for rows in (slice(5, None), slice(None, 3))]
+        cases += [(height, float(height.max())) for height in beside]
+    for height, highest in cases:
         assert pressed(height, rv.Program().load(1e-3, over=0), edge="accept").height.attrs["highest"] == highest
 
 

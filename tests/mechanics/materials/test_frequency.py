@@ -37,6 +37,12 @@ def test_power_law__is_the_transform_of_its_creep():
     assert np.isinf(complex_compliance(material, 0.0))
 
 
+def test_function_of_the_users_own__is_followed_from_the_lowest_frequency_to_the_highest():
+    law = rv.power_law(0.5, 2.0, 0.3, time_scale=0.1, poisson=0.4)
+    own, w = rv.creep(lambda t: 0.5 + 2.0 * (t / 0.1) ** 0.3, poisson=0.4), np.geomspace(1e-3, 1e3, 13)
+    np.testing.assert_allclose(complex_compliance(own, w), complex_compliance(law, w), rtol=1e-3)
+
+
 def test_table__has_its_own_poisson_ratio():
     t = np.geomspace(1e-4, 1e4, 40)
     half, third = (complex_compliance(rv.creep_table(t, 1 + t**0.3, poisson=nu), [0.1, 2.0]) for nu in (0.5, 0.3))
