@@ -101,6 +101,8 @@ def test_lee_radok__is_elastic_at_each_instant_with_the_load_and_compliance_sinc
         (lambda: cf.lee_radok(0.7, rv.elastic(1.0), -1.0), "load"),
         (lambda: cf.lee_radok(0.7, rv.elastic(1.0), rv.Program().approach(1.0, over=1.0)), "load"),
         (lambda: cf.lee_radok(0.7, rv.elastic(1.0), rv.Program().load(1.0, over=1.0).load(0.0, over=1.0)), "load"),
+        (lambda: cf.lee_radok(0.7, rv.elastic(1.0), rv.Program().load(1.0, over=1.0).slide(1.0, over=1.0)), "load"),
+        (lambda: cf.lee_radok(0.7, rv.elastic(1.0), rv.Program.cycle(1.0, 0.5, 1.0, 1)), "load"),
     ],
 )
 def test_closed_forms__refuse(make, key):

@@ -110,6 +110,16 @@ def test_endless_creep__slides_under_a_profile_that_is_the_same_all_across(mater
     assert float((ds.pressure[0].max(across) - ds.pressure[0].min(across)).max()) == 0
 
 
+def test_flat_surface__sinks_uniformly_and_slides_freely():
+    """Into a bonded sheet by ``h (1 - 2 nu) / (1 - nu)^2`` times the relaxed compliance times the pressure."""
+    gel, thickness = rv.zener(1e6, 0.3e6, 0.3e3, poisson=0.3), 1e-4
+    found = rv.friction(rv.from_array(np.zeros((6, 5)), 1e-5), rv.sheet(gel, thickness), pressure=2e4, speeds=0.2)
+    sunk = thickness * 0.4 / 0.7**2 * 2e4 * float(gel.contact_compliance(np.inf))
+    assert float(found.approach[0]) == pytest.approx(sunk, rel=1e-9)
+    assert float(found.friction_force[0]) == 0
+    assert float(found.contact_fraction[0]) == 1
+
+
 def test_unsolved_speed__is_named(monkeypatch):
     """No curve is known on which the iteration stops early: here it has only two iterations."""
     few = partial(steady_sliding.steady_state, max_iterations=2)

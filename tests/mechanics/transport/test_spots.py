@@ -133,8 +133,21 @@ def test_edges__are_told_apart():
     assert opened[0] < frozen_contact(spot, UNIT, present=half)[0] < ended[0]
 
 
-def test_lengths__scale():
-    spots = rough_gap((14, 15), seed=3) < 2.0
-    one, tiny = (frozen_contact(spots, (s, 1.3 * s)) for s in (1.0, 1e-9))
-    assert tiny[0] == pytest.approx(1e-9 * one[0], rel=1e-9)
-    assert tiny[1] == pytest.approx(1e-9 * one[1], rel=1e-6)
+SPOTS, MATERIAL = rough_gap((14, 15), seed=3) < 2.0, rough_gap((14, 15), seed=3) < 2.5
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic", "mirror"])
+def test_lengths__scale_and_the_turned_map_conducts_as_much(boundary):
+    """Stiffness and error, on cells of 1 : 4, with edges of both kinds."""
+    one = frozen_contact(SPOTS, (1.0, 4.0), boundary, present=MATERIAL)
+    tiny = frozen_contact(SPOTS.T, (4e-9, 1e-9), boundary, present=MATERIAL.T)
+    assert tiny == pytest.approx((1e-9 * one[0], 1e-9 * one[1]), rel=1e-5)
+
+
+def test_mirrored_spots__conduct_as_the_unfolded_ones():
+    """Four images with equal errors."""
+    images = [(0, count) for count in SPOTS.shape]
+    spots, material = (np.pad(one, images, mode="symmetric") for one in (SPOTS, MATERIAL))
+    whole = frozen_contact(spots, (1.0, 4.0), "periodic", present=material)
+    part = frozen_contact(SPOTS, (1.0, 4.0), "mirror", present=MATERIAL)
+    assert whole == pytest.approx((4 * part[0], 4 * part[1]), rel=1e-5)
