@@ -38,3 +38,5 @@ def test_pressure__refers_to_the_surface_as_given_where_the_grid_grows():
     assert not any(line.any() for line in (pressure[0], pressure[-1], pressure[:, 0], pressure[:, -1]))
     assert float(ds.force[0]) == pytest.approx(0.2e6 * 1e-8)
     assert float(at_rows(ds).nominal_pressure[0]) == pytest.approx(0.2e6)
+    whole = ds.pressure[0].size * (1e-4 / 16) ** 2
+    assert float(ds.contact_fraction[0] * whole) == pytest.approx(float(ds.contact_area[0]))

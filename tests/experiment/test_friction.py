@@ -39,6 +39,9 @@ def test_directions__are_those_of_a_turned_surface():
         sides = (1e-3 / 40, 0.8e-3 / 36)
         surface = rv.from_array(turn(ROUGH.values), spacing=sides if direction == "-x" else sides[::-1])
         along_x = rv.friction(surface, RUBBER, **one)
+        # the time in which the longer side slides past a point
+        passed = RUBBER.contact_compliance(1e-3 * 39 / 40 / 0.2)
+        assert found.attrs["compliance_at_end"] == pytest.approx(float(passed), rel=1e-9)
         for name in {name for name in found.data_vars if found[name].dims == ("speed",)} - {"wall_time"}:
             np.testing.assert_allclose(found[name], along_x[name], rtol=1e-9, err_msg=name)
         np.testing.assert_allclose(turn(found.pressure.values[0]), along_x.pressure[0], rtol=1e-9)

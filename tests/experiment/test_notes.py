@@ -48,6 +48,16 @@ def test_border__is_a_warning_for_periodic_surfaces_that_repeat_with_a_step(capl
         assert "border" not in warnings_of(pressed(height, boundary).attrs)
 
 
+def test_slope__is_of_what_is_pressed():
+    """The flanks of a ball do not count before they are reached; of a periodic surface all counts."""
+    ball, body, settings = rv.sphere(1.0, 1.6, (17, 15)), rv.elastic(1e6), {"times": 1, "progress": False}
+    found = [
+        rv.simulate(ball, body, rv.Program().approach(depth, over=0), boundary=boundary, **settings)
+        for boundary, depth in (("free", 0.03), ("free", 0.5), ("periodic", 0.03))
+    ]
+    assert ["slope" in warnings_of(ds.attrs) for ds in found] == [False, True, True]
+
+
 def ball_pressed(depth, **options):
     """A ball over a square of 17 x 15 cells; its contact is within it to about the depth of the middle of a side."""
     ball = rv.sphere(radius=1e-3, size=(17e-6, 15e-6), shape=(17, 15))

@@ -85,6 +85,10 @@ def test_kept_times__are_counted_listed_or_snapped(times, expected):
         ({"program": rv.Program()}, "program"),
         ({"times": [2.0]}, "times holds 2 s"),
         ({"boundary": "periodic", "program": rv.Program().approach(1e-3, over=1)}, "program.0: found 0.001"),
+        (
+            {"boundary": "periodic", "program": rv.Program.cycle(2e-6, 1e-5, 1.0, 1, control="approach")},
+            "program.1: found 1.2e-05",
+        ),
     ],
 )
 def test_bad_input__is_named(wrong, named):

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 import roughvisc as rv
@@ -58,11 +59,17 @@ def test_wake_note__of_a_surface_without_a_recipe_goes_by_what_touches():
 
 
 def test_wake_note__of_a_program_is_of_slides_that_come_as_far_as_the_next_wake(caplog):
+    """Of a measured ridge along x that slides along y, on cells of 2 : 1."""
     period = 45 * CELL
-    press = rv.Program().load(2e-2, over=0)
+    y = (np.arange(45) - 22) * CELL
+    ridge = rv.from_array(np.tile(-(y**2) / 2e-2, (4, 1)), spacing=(2 * CELL, CELL))
+    press = rv.Program().pressure(2e4, over=0)
     settings = {"boundary": "periodic", "tolerance": 1e-2, "times": 1, "progress": False}
-    near, far = (rv.simulate(ball(45), RUBBER, press.slide(n * period, speed=FAST), **settings) for n in (0.4, 2.0))
-    assert "wake:" not in near.attrs.get("warnings", "")
+    programs = (press.slide(n * period, speed=FAST, direction="-y") for n in (0.4, 2.0))
+    near, far = (rv.simulate(ridge, RUBBER, program, **settings) for program in programs)
+    along_x = rv.simulate(ridge, RUBBER, press.slide(2 * period, speed=FAST), **settings)
+    for one in (near, along_x):
+        assert "wake:" not in one.attrs.get("warnings", "")
     creep = [1 + -math.expm1(-n * period / (FAST * TIME)) for n in (1, 2)]
     assert f"up to {100 * (1 - creep[0] / creep[1]):.2g} % of the creep" in far.attrs["warnings"]
     assert warnings_of(far.attrs)["wake"] in caplog.text
