@@ -62,7 +62,7 @@ def test_wake_note__of_a_program_is_of_slides_that_come_as_far_as_the_next_wake(
     """Of a measured ridge along x that slides along y, on cells of 2 : 1."""
     period = 45 * CELL
     y = (np.arange(45) - 22) * CELL
-    ridge = rv.from_array(np.tile(-(y**2) / 2e-2, (4, 1)), spacing=(2 * CELL, CELL))
+    ridge = rv.from_array(np.tile(-(y**2) / 2e-2, (45, 1)), spacing=(2 * CELL, CELL))
     press = rv.Program().pressure(2e4, over=0)
     settings = {"boundary": "periodic", "tolerance": 1e-2, "times": 1, "progress": False}
     programs = (press.slide(n * period, speed=FAST, direction="-y") for n in (0.4, 2.0))
