@@ -8,11 +8,11 @@ converts nominal pressures to loads on a known area.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, update_wrapper
 from itertools import accumulate, pairwise
-from typing import Any, Literal, get_args
+from typing import Any, Concatenate, Generic, Literal, ParamSpec, get_args
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
@@ -147,6 +147,23 @@ class Segment:
 # Segments that the text of a program lists.
 _LISTED = 8
 
+_Arguments = ParamSpec("_Arguments")
+
+
+class _Continuing(Generic[_Arguments]):
+    """Decorator of a method that adds to a program; on the class it adds to the empty program.
+
+    A class method would also be found on a chained program, which it would drop.
+    """
+
+    def __init__(self, method: Callable[Concatenate[Program, _Arguments], Program]) -> None:
+        update_wrapper(self, method)  # type: ignore[arg-type]  # copies name and docstring, and is not called
+        self._method = method
+
+    def __get__(self, program: Program | None, owner: type[Program]) -> Callable[_Arguments, Program]:
+        """Return the method bound to a program, or to an empty one."""
+        return self._method.__get__(owner() if program is None else program)
+
 
 @dataclass(frozen=True)
 class Program:
@@ -193,7 +210,7 @@ class Program:
         return self + Program((Segment(control, number(over, "s", "over", least=0), end),))
 
     def __add__(self, other: Program) -> Program:
-        """Return this program followed by another one."""
+        """Return this program followed by another one, whose first ramp begins where this program ends."""
         return Program(self.segments + other.segments, " ".join(filter(None, (self.note, other.note))))
 
     def load(self, value: float | str, *, over: float | str) -> Program:
@@ -342,27 +359,39 @@ class Program:
         control = self.segments[-1].control if self.segments else "load"
         return self + Program((Segment(control, lasting, slide=Slide(far, direction)),))
 
-    @classmethod
+    @_Continuing
     def table(
-        cls, times: Sequence[float | str], values: Sequence[float | str], control: Control = "load", note: str = ""
+        self, times: Sequence[float | str], values: Sequence[float | str], control: Control = "load", note: str = ""
     ) -> Program:
         """Interpolate linearly between the rows of a table; two rows at the same time are a jump.
+
+        ``Program.table(...)`` is a program of the table alone. On a program, the table continues it.
 
         Parameters
         ----------
         times : sequence of float or str
-            Times in increasing order from zero; a nonzero value at time zero is a jump. [s]
+            Times since the end of the program so far, in increasing order from zero. [s]
         values : sequence of float or str
-            Load [N], approach [m] or nominal pressure [Pa] at these times.
+            Load [N], approach [m] or nominal pressure [Pa] at these times. If the first value differs from the end of
+            the program so far, it is reached by a jump.
         control : {"load", "approach", "pressure"}
             Quantity of the values.
         note : str
             Note of the program.
 
+        Returns
+        -------
+        Program
+
         Raises
         ------
         InputError
             If the lengths differ, or the times do not increase from zero; the message names the row.
+
+        Examples
+        --------
+        >>> Program().load(2.0, over=1.0).table([0, 1], [0.5, 1.0])
+        Program: load to 2 N over 1 s, load to 500 mN at once, load to 1 N over 1 s
         """
         unit = UNITS[one_of("control", control, UNITS)]
         if len(times) != len(values) or not len(times):
@@ -377,15 +406,19 @@ class Program:
             if now < before:
                 raise InputError(key=f"times.{row}", found=times[row], expected=f"at least {before!r} s")
             segments.append(Segment(control, now - before, ends[row]))
-        return cls(tuple(segments if ends[0] else segments[1:]), note)
+        last = self.segments[-1] if self.segments else Segment(control, 0.0, 0.0)  # a program begins at zero
+        if ends[0] == 0 and (last.control, last.end) == (control, 0.0):
+            del segments[0]  # no jump
+        return self + Program(tuple(segments), note)
 
-    @classmethod
+    @_Continuing
     def cycle(
-        cls, mean: float | str, amplitude: float | str, period: float | str, cycles: float, control: Control = "load"
+        self, mean: float | str, amplitude: float | str, period: float | str, cycles: float, control: Control = "load"
     ) -> Program:
         """Apply a sine wave about a mean, after a jump to the mean.
 
-        To ramp to the mean instead, add programs: ``Program().load(1.0, over=0.1) + Program.cycle(1.0, 0.5, 2.0, 5)``.
+        ``Program.cycle(...)`` is a program of the wave alone. On a program, the wave continues it; ramp to the mean
+        first to avoid the jump.
 
         Parameters
         ----------
@@ -398,10 +431,19 @@ class Program:
         control : {"load", "approach", "pressure"}
             The oscillating quantity.
 
+        Returns
+        -------
+        Program
+
         Raises
         ------
         InputError
             If a quantity has a wrong type or unit, or load or pressure become negative.
+
+        Examples
+        --------
+        >>> Program().load(1.0, over=0.1).cycle(mean=1.0, amplitude=0.5, period=2.0, cycles=5).duration
+        10.1
         """
         unit = UNITS[one_of("control", control, UNITS)]
         middle = number(mean, unit, "mean", least=LEAST.get(control))
@@ -410,7 +452,7 @@ class Program:
             raise InputError(key="amplitude", found=amplitude, expected=f"at most the mean, {mean!r}")
         length = number(period, "s", "period", above=0)
         duration = number(length * number(cycles, "1", "cycles", above=0, most=1e6), "s", "cycles")
-        return cls((Segment(control, 0.0, middle), Segment(control, duration, middle, height, length)))
+        return self + Program((Segment(control, 0.0, middle), Segment(control, duration, middle, height, length)))
 
     def on_area(self, area: Quantity) -> Program:
         """Convert nominal pressures to loads on a surface.

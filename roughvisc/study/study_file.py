@@ -45,11 +45,11 @@ TABLES = ("title", "surface", "material", "program", "friction", "solve", "keep"
 #: Keys of a temperature, which every model has, and of a body that is not a half-space.
 TEMPERATURE = ("temperature", "reference_temperature", "wlf_c1", "wlf_c2", "activation_energy", "shift_factor")
 GEOMETRY = ("thickness", "base", "on")
-#: Method of each segment of a program, by the key of its first argument; and functions that make programs from a table.
+#: Method of each segment of a program, by the key of its first argument; and methods whose arguments are a table.
 SEGMENTS: dict[str, Callable[..., Program]] = {
     name: getattr(Program, name) for name in ("load", "pressure", "approach", "hold", "slide")
 }
-PROGRAMS: dict[str, Callable[..., Program]] = {"cycle": Program.cycle, "table": Program.table}
+PROGRAMS: dict[str, Callable[..., Program]] = {name: getattr(Program, name).__func__ for name in ("cycle", "table")}
 #: Table of each setting.
 TABLE_OF = {one.name: "solve" for one in fields(Settings)} | {"missing": "surface"}
 TABLE_OF |= dict.fromkeys(("fields", "times"), "keep")
@@ -345,11 +345,7 @@ def program_of(segments: Any) -> Program:
         arguments = a_table(where, value)
         if "control" in arguments:
             raise InputError(key=f"{where}.control", found=arguments["control"], expected=f"this key next to {kind}")
-        added = call(PROGRAMS[kind], where, arguments | {"control": control})
-        begins_at_zero = kind == "table" and number(arguments["values"][0], UNITS[control]) == 0
-        if begins_at_zero and any((one.control, one.end) != (control, 0.0) for one in program.segments[-1:]):
-            program = getattr(program, control)(0.0, over=0.0)
-        program += added
+        program = call(PROGRAMS[kind], where, arguments | {"control": control}, program)
     return program
 
 

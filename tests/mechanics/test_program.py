@@ -1,5 +1,6 @@
 """Loading programs: values, corners, what is refused."""
 
+import inspect
 import math
 
 import pytest
@@ -20,6 +21,31 @@ def test_chain__adds_segments_in_order():
     assert program.largest_load == 2.0
 
 
+@pytest.mark.parametrize(
+    "add",
+    [
+        lambda chain: chain.load(2.0, over=1.0),
+        lambda chain: chain.hold(1.0, "load"),
+        lambda chain: chain.table([0, 1], [0.5, 2.0]),
+        lambda chain: chain.cycle(1.0, 0.5, 2.0, 5),
+    ],
+)
+def test_chain__is_the_sum_of_its_parts(add):
+    assert add(PRESSED.hold(1.0)) == PRESSED.hold(1.0) + add(rv.Program())
+
+
+def test_chain__has_no_method_of_the_class():
+    methods = inspect.getmembers(PRESSED, inspect.ismethod)
+    assert {"load", "table", "cycle"} <= {name for name, _ in methods}
+    assert [name for name, method in methods if method.__self__ is not PRESSED] == []
+    assert rv.Program.table([0, 1], [0.5, 2.0]) == rv.Program().table([0, 1], [0.5, 2.0])
+
+
+def test_table__that_begins_at_zero_begins_there():
+    assert PRESSED.table([0, 1], [0, 2]) == PRESSED.load(0.0, over=0.0).load(2.0, over=1.0)
+    assert PRESSED.load(0.0, over=1.0).table([0, 1], [0, 2]) == PRESSED.load(0.0, over=1.0).load(2.0, over=1.0)
+
+
 def test_slide__keeps_what_is_controlled_and_takes_its_time():
     program = PRESSED.hold(1.0, control="approach").slide("2 mm", speed="1 mm/s").slide(1e-3, over=4.0, direction="-y")
     assert [(s.control, s.duration, s.end) for s in program.segments[1:]] == [
@@ -37,7 +63,7 @@ def test_table__ramps_between_rows_and_jumps_within_a_time():
 
 
 def test_cycle__is_a_sine_about_its_mean():
-    program = rv.Program().load(3.0, over=1.0) + rv.Program.cycle(3.0, 1.0, period=2.0, cycles=2.5)
+    program = rv.Program().load(3.0, over=1.0).cycle(3.0, 1.0, period=2.0, cycles=2.5)
     assert program.duration == 6.0
     assert [program.prescribed(2, 1 + t, 3.0) for t in (0, 0.5, 1.0, 1.5)] == pytest.approx([3, 4, 3, 2])
     assert program.largest_load == 4.0
