@@ -36,7 +36,7 @@ def simulate(
     *,
     boundary: Boundary = Settings.boundary,
     tolerance: float = Settings.tolerance,
-    times: int | Sequence[float | str] | None = Settings.times,
+    times: int | Sequence[float | str] | str | None = Settings.times,
     fields: Sequence[str] = Settings.fields,
     missing: Missing = Settings.missing,
     edge: Edge = Settings.edge,
@@ -69,10 +69,10 @@ def simulate(
         Relative tolerance on ``stated_error`` at each output time: the error of pressure (L1), force and approach from
         time steps, contact solver and exponential series, over the largest force and approach of the kept rows so far.
         If rows exceed it, a ``UserWarning`` and the attribute ``warnings`` count them. The grid error is not included.
-    times : int or sequence of float or str, optional
-        Output times, reached exactly: how many, counting time zero and the corners of the program, the others where the
-        result changes most; a list; or None, in a study ``"all"``, for all corners and every accepted step whose stated
-        error is at most half the tolerance. [s]
+    times : int, sequence of float or str, or str, optional
+        Output times, reached exactly. A whole number: how many rows, counting time zero and the corners of the program,
+        the others where the result changes most. A list, or one text with a unit: the times. None, in a study
+        ``"all"``: all corners and every accepted step whose stated error is at most half the tolerance. [s]
     fields : sequence of str
         Fields to keep: any of ``pressure``, ``gap``, ``displacement``.
     missing : {"refuse", "absent"}

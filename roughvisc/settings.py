@@ -22,7 +22,7 @@ from roughvisc.mechanics.program import Program, instant
 from roughvisc.topography.borders import is_mirrored, is_periodic
 from roughvisc.topography.grid import checked
 from roughvisc.topography.recipes import BOUNDARIES, indenter_of, recipe_name
-from roughvisc.units import in_si, number
+from roughvisc.units import listed, number
 from roughvisc.variables import FIELDS
 
 if TYPE_CHECKING:
@@ -122,7 +122,7 @@ class Settings(Numerics):
 
     boundary: Boundary = "auto"
     tolerance: float = 1e-3
-    times: int | Sequence[float | str] | None = None
+    times: int | Sequence[float | str] | str | None = None
     fields: Sequence[str] = ("pressure", "gap")
     edge: Edge = "error"
     missing: Missing = "refuse"
@@ -132,16 +132,10 @@ class Settings(Numerics):
         super().__post_init__()
         tolerance = number(self.tolerance, "1", "tolerance", least=FINEST_TOLERANCE, below=1)
         times: Any = self.times
-        if isinstance(times, int | np.integer):
+        if isinstance(times, int | np.integer) and not isinstance(times, bool):
             times = int(number(int(times), "1", "times", least=1, most=MOST_TIMES))
         elif times is not None:
-            try:
-                times = tuple(np.unique(np.asarray(in_si(times, "s", "times"), dtype=float)).tolist())
-            except (TypeError, ValueError) as error:  # an InputError is a ValueError
-                if getattr(error, "key", "times") != "times":  # one entry of a list
-                    raise
-                expected = "a number of times, a list of times [s], or None"
-                raise InputError(key="times", found=self.times, expected=expected) from error
+            times = tuple(np.unique(listed(times, "s", "times", "a whole number counts rows")).tolist())
         names = tuple(self.fields) if isinstance(self.fields, Iterable) else (self.fields,)
         if not set(names) <= set(FIELDS):
             raise InputError(key="fields", found=self.fields, expected=f"some of {', '.join(FIELDS)}")

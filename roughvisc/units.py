@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Set
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import wraps
@@ -160,6 +160,45 @@ def in_si(value: Any, unit: str, name: str) -> Any:
     if not isinstance(value, list | tuple) or {str, np.str_, list, tuple}.isdisjoint(map(type, value)):
         return value
     return type(value)([in_si(one, unit, f"{name}[{place}]") for place, one in enumerate(value)])
+
+
+def listed(value: Any, unit: str, key: str, rows: str) -> NDArray[np.float64]:
+    """Return the quantities of a list, or of one text with a unit, as an array of numbers.
+
+    A bare number is refused: it could be a quantity as well as a number of rows.
+
+    Parameters
+    ----------
+    value : Any
+        List or array of numbers and texts, or one text.
+    unit : str
+        Unit of the result.
+    key : str
+        Name of the list in messages.
+    rows : str
+        What a bare whole number means, for the message.
+
+    Raises
+    ------
+    InputError
+        If the value is a bare number or nothing of this kind, or an entry is not a quantity of this unit.
+
+    Examples
+    --------
+    >>> listed([0, "5 ms"], "s", "times", "a whole number counts rows")
+    array([0.   , 0.005])
+    """
+    plain = np.asarray(value).tolist() if hasattr(value, "dtype") else value
+    if isinstance(plain, str):
+        return np.array([number(plain, unit, key)])
+    if not isinstance(plain, Iterable) or isinstance(plain, Mapping | Set):
+        is_number = isinstance(plain, Real) and not isinstance(plain, bool)
+        written = f"[{plain:g}] or '{plain:g} {unit}'" if is_number else f"a list [{unit}], or text with a unit"
+        raise InputError(key=key, found=value, expected=f"{written}; {rows}")
+    entries = list(plain)
+    if {float, int}.issuperset(map(type, entries)):
+        return np.array(entries, dtype=float)
+    return np.array([number(one, unit, f"{key}[{place}]") for place, one in enumerate(entries)])
 
 
 def quantities(**units: str) -> Callable[[_Taking], _Taking]:

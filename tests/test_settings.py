@@ -38,6 +38,9 @@ def test_defaults__are_the_same_in_python_in_a_study_and_in_the_value():
         ("time_step", "10 mm"),
         ("times", 0),
         ("times", {0.1}),
+        ("times", 1.0),
+        ("times", True),
+        ("times", np.float64(2)),
         ("fields", None),
         ("fields", ("gap", "stress")),
         ("device", "tpu"),
@@ -59,6 +62,7 @@ def test_numerics__are_checked(name):
 def test_settings__are_one_frozen_value():
     one = Settings(times=np.array([0.5, 0.25, 0.5]), fields=["gap"], time_step="1 s")
     assert one == Settings(times=(0.25, 0.5), fields=("gap",), time_step=1.0)
+    assert Settings(times="0.5 s").times == Settings(times=[0.5]).times == (0.5,)
     assert len({one, Settings(times=[0.25, 0.5], fields=iter(["gap"]), time_step=1.0)}) == 1
     with pytest.raises(FrozenInstanceError):
         one.tolerance = 0.1

@@ -15,6 +15,7 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
@@ -25,7 +26,7 @@ from roughvisc.study.storage.folder import atomic_write
 from roughvisc.topography.filters import fill, off_plane
 from roughvisc.topography.grid import cell_edges, checked, require_heights, spacing
 from roughvisc.topography.spectrum import psd
-from roughvisc.units import Quantity, Unit, in_si, quantities, unit_for
+from roughvisc.units import Quantity, Unit, listed, quantities, unit_for
 from roughvisc.variables import AXES, FIELDS, VARIABLES, axis_of
 
 #: Field -> perceptually even colour map without the colour of contact; reduction of a block of cells to one drawn cell;
@@ -44,15 +45,36 @@ MOST_CELLS, _MOST_FRAMES = 1024, 8
 _SHOWN, _SPIKE = 99.8, 1.2
 
 
-def frames_at(dataset: xr.Dataset, places: Any) -> list[int]:
-    """Return the numbers of the rows nearest to some times or speeds; a negative whole number counts from the end."""
+def rows_at(places: Any, axis: str, key: str, count: int, most: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return times or speeds, and which of them are negative whole numbers, which count rows from the end.
+
+    Parameters
+    ----------
+    places : int, str or list
+        One row from the end, one text, or a list of both and of numbers.
+    axis : {"time", "speed"}
+        Axis of the rows.
+    key : str
+        Name of the argument in messages.
+    count, most : int
+        Number of rows, and largest number of places.
+    """
+    unit = VARIABLES[axis].units
+    if isinstance(places, int | np.integer) and places < 0:
+        places = [places]
+    wanted = listed(places, unit, key, "a negative whole number counts rows from the end")
+    from_end = (wanted < 0) & (wanted == np.floor(wanted)) & (-wanted <= count)
+    if not 0 < wanted.size <= most or not (from_end | ((wanted >= 0) & np.isfinite(wanted))).all():
+        expected = f"1 to {most} {axis}s [{unit}], or -1 to -{count} to count from the end"
+        raise InputError(key=key, found=wanted.tolist(), expected=expected)
+    return wanted, from_end
+
+
+def frames_at(dataset: xr.Dataset, places: Any, key: str = "times") -> list[int]:
+    """Return the numbers of the rows nearest to some times or speeds; see :func:`rows_at`."""
     axis = axis_of(dataset.variables)
-    rows, unit = dataset[axis].values, VARIABLES[axis].units
-    wanted = np.atleast_1d(np.asarray(in_si(places, unit, f"{axis}s"), dtype=float)).ravel()
-    from_end = (wanted < 0) & (wanted == np.floor(wanted)) & (-wanted <= rows.size)
-    if not 0 < wanted.size <= _MOST_FRAMES or not (from_end | ((wanted >= 0) & np.isfinite(wanted))).all():
-        expected = f"1 to {_MOST_FRAMES} {axis}s [{unit}], or -1 to -{rows.size} to count from the end"
-        raise InputError(key=f"{axis}s", found=wanted.tolist(), expected=expected)
+    rows = dataset[axis].values
+    wanted, from_end = rows_at(places, axis, key, rows.size, _MOST_FRAMES)
     nearest = np.abs(rows - wanted[:, None]).argmin(axis=1)
     return np.where(from_end, rows.size + wanted, nearest).astype(int).tolist()
 
@@ -181,9 +203,10 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
     ----------
     dataset : xarray.Dataset
         One case's result; if its fields are on Dask, only the drawn frames are loaded.
-    times : float or str, or a list, optional
-        The nearest kept times [s], or speeds [m/s], are drawn; negative whole numbers count from the end. Default: up
-        to four, evenly spread, among them the time of the largest contact or the speed of the largest friction.
+    times : list of float or str, str or int, optional
+        Times [s] or speeds [m/s], as a list or one text with a unit; the nearest kept ones are drawn. Negative whole
+        numbers, also a single one, count from the end. Default: up to four, evenly spread, among them the time of the
+        largest contact or the speed of the largest friction.
     fields : sequence of str
         Any of ``"pressure"``, ``"gap"``, ``"displacement"``; fields that are not in the result are skipped. Or
         ``"flux"`` of a leaking fluid, computed from the gap with the settings of ``leak_rate`` in the result, else
@@ -234,16 +257,17 @@ def _flux_of(dataset: xr.Dataset) -> xr.DataArray:
 
 @style.apply
 @quantities(at="m")
-def section(dataset: xr.Dataset, time: Quantity | None = None, axis: str = "x", at: Quantity | None = None) -> Figure:
+def section(dataset: xr.Dataset, time: Any = None, axis: str = "x", at: Quantity | None = None) -> Figure:
     """Draw a cut through the contact: the pressure above, below it the profile and the deformed surface.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         One case's result with ``height``, ``pressure`` and ``gap``.
-    time : float or str, optional
-        The nearest kept time is drawn; a negative whole number counts frames from the end. Default: the last time with
-        the largest contact area, or the speed of the largest friction. [s] or [m/s]
+    time : str, list or int, optional
+        A time or a speed, as text with a unit or a list of one number; the nearest kept one is drawn. A negative whole
+        number counts from the end. Default: the last time with the largest contact area, or the speed of the largest
+        friction. [s] or [m/s]
     axis : {"x", "y"}
         Direction of the cut.
     at : float or str, optional
@@ -256,7 +280,7 @@ def section(dataset: xr.Dataset, time: Quantity | None = None, axis: str = "x", 
     expect_result(dataset, "x", "y", "height", "pressure", "gap")
     one_of("axis", axis, ("x", "y"))
     rows, across = axis_of(dataset.variables), "y" if axis == "x" else "x"
-    frame = largest_row(dataset) if time is None else frames_at(dataset, time)[0]
+    frame = largest_row(dataset) if time is None else frames_at(dataset, time, "time")[0]
     whole = dataset.isel({rows: frame})
     load, places = whole["pressure"].sum(axis).values, dataset[across].values
     index = int(load.argmax() if at is None else np.abs(places - at).argmin())

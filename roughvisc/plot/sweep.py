@@ -16,9 +16,9 @@ from matplotlib.figure import Figure
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.plot import style
+from roughvisc.plot.fields import rows_at
 from roughvisc.study.case_text import names_of, value_text
 from roughvisc.study.sweep_table import ITSELF, REALISATION, statistics
-from roughvisc.units import in_si
 from roughvisc.variables import AXES, CONDUCTANCES, ROW, ROWS, VARIABLES, axis_of
 
 #: Largest number of panels, and of values of a key in a legend.
@@ -74,8 +74,9 @@ def sweep(results: xr.Dataset, quantity: str | None = None, *, along: str | None
         Dotted key on the horizontal axis, such as ``"program.0.load"``; or ``"time"``, ``"speed"``,
         ``"reduced_speed"`` for curves of all cases. Default: the key with most numbers, or the
         speed; if only realisations vary, the time.
-    times : float or str, or a list, default -1
-        The nearest kept times are drawn; negative whole numbers count from the end. [s]
+    times : list of float or str, str or int, default -1
+        Times, as a list or one text with a unit; the nearest kept times are drawn. Negative whole numbers, also a
+        single one, count from the end. [s]
 
     Returns
     -------
@@ -112,13 +113,9 @@ def _at_times(values: xr.DataArray, times: Any = -1) -> pd.DataFrame:
     axis = axis_of(values.coords)
     table = values.load().to_dataframe().reset_index().dropna(subset=axis)
     rows = table.groupby([dim for dim in ("case", REALISATION) if dim in values.dims])[axis]
-    places = np.atleast_1d(in_si(times, VARIABLES[axis].units, "times"))
-    if not 0 < len(places) <= _MOST_PANELS or not places.min() >= -rows.size().max():
-        expected = f"1 to {_MOST_PANELS} {axis}s, or whole numbers from -1 on to count from the end"
-        raise InputError(key="times", found=places.tolist(), expected=expected)
     parts = []
-    for place in places:
-        off = rows.cumcount(ascending=False) + 1 + place if place < 0 else table[axis] - place
+    for place, is_from_end in zip(*rows_at(times, axis, "times", rows.size().max(), _MOST_PANELS), strict=True):
+        off = rows.cumcount(ascending=False) + 1 + place if is_from_end else table[axis] - place
         part = table.loc[off.abs().groupby(rows.ngroup()).idxmin()]
         text = AXES[axis].place(part[axis].iloc[0], 3)
         if part[axis].nunique() > 1:

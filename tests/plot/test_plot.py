@@ -143,9 +143,9 @@ def test_maps__of_the_times_and_fields_requested():
     ds = made.hertz_creep()
     assert len(images(plot.maps(ds, times=ds["time"].values[:6], fields="gap"))) == 6
     assert len(images(plot.maps(ds.drop_vars("pressure")))) == 4
-    (displaced,) = images(plot.maps(ds, times=5.0, fields=["displacement"]))
+    (displaced,) = images(plot.maps(ds, times="5 s", fields=["displacement"]))
     np.testing.assert_allclose(displaced.get_array(), 1e6 * ds["displacement"].sel(time=5.0, method="nearest").T)
-    for wrong in (ds["time"].values[:9].tolist(), [], [-31.0], [-0.5], [np.inf]):
+    for wrong in (ds["time"].values[:9].tolist(), [], [-31.0], [-0.5], [np.inf], 1, 1.0, True):
         with refused("times", wrong):
             plot.maps(ds, times=wrong)
     with refused("fields", "stress"):
@@ -179,7 +179,7 @@ def test_maps__of_the_flux_show_the_largest_one():
     ds = xr.Dataset({"gap": (("time", "x", "y"), gap)}, axes)
     assert len(images(plot.maps(ds, fields="flux"))) == 2, "the second is closed"
     water = observables.leakage(ds, flow=True, viscosity=1e-2)
-    drawn = images(plot.maps(ds.merge(water[["leak_rate"]]), times=1.0, fields="flux"))[0].get_array()
+    drawn = images(plot.maps(ds.merge(water[["leak_rate"]]), times=[1.0], fields="flux"))[0].get_array()
     largest = float(np.hypot(water.flux_x, water.flux_y).max())
     assert any(drawn.max() == pytest.approx(unit * largest, rel=1e-9) for unit in (1e6, 1e12))
 
