@@ -259,6 +259,26 @@ def test_slopes_that_are_not_loaded__do_not_warn():
     assert "slope:" not in punch.attrs.get("warnings", "")
 
 
+@pytest.mark.parametrize("across", [False, True])
+@pytest.mark.parametrize(("load", "warns"), [(0.01, False), (0.1, True)])
+def test_slopes_of_a_long_period__count_in_the_contact(load, warns, across):
+    """A cylinder of radius 1 on a period of 1.9, per unit length; the contact of half-width a has the slope a."""
+    x = (np.arange(190) + 0.5) * 1e-2 - 0.95
+    height = cells(np.repeat(-(x[:, None] ** 2) / 2, 2, 1), 1e-2)
+    height = height.transpose("y", "x").rename(x="y", y="x") if across else height
+    direction, per_length = "y" if across else "x", load * 2e-2
+    press = rv.Program().load(per_length, over=0)
+    results = [
+        rv.friction(height, ZENER, load=per_length, speeds=1.0, direction=direction, progress=False),
+        simulate(height, ELASTIC, press, boundary="periodic"),
+        simulate(height, ELASTIC, press, boundary="mirror"),
+    ]
+    for ds in results:
+        assert ("slope:" in ds.attrs.get("warnings", "")) is warns
+        half_width = 1.9 / 2 * float(ds.contact_fraction.max())
+        assert rv.audit(ds)["slope"].number == pytest.approx(2 * half_width / math.sqrt(3), rel=0.05)
+
+
 def test_float32_heights__differ_by_their_rounding():
     program = rv.Program().load(1e-2, over=0.1).hold(1.0)
     found, exact = (simulate(h, ZENER, program, boundary="periodic") for h in (ROUGH.astype("float32"), ROUGH))

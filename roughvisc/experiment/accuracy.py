@@ -182,7 +182,27 @@ def border_warning(height: xr.DataArray) -> str:
     )
 
 
-def slope_warning(height: xr.DataArray, boundary: str, approach: float) -> str:
+def loaded_depth(height: xr.DataArray, fraction: float) -> float:
+    """Return how far the loaded surface of a periodic contact reaches below the highest cell. [m]
+
+    The loaded surface is twice as large as the contact, as the part of a ball above its approach is. It has the highest
+    cells; under friction the contact lies on one side of its crest.
+
+    Parameters
+    ----------
+    height : DataArray, dims (x, y)
+        The rigid profile. [m]
+    fraction : float
+        Largest contact area over nominal area. [-]
+    """
+    heights = height.values[np.isfinite(height.values)]
+    count = math.ceil(2 * fraction * heights.size)
+    if count >= heights.size:
+        return math.inf
+    return float(heights.max() - np.partition(heights, -max(count, 1))[-max(count, 1)])
+
+
+def slope_warning(height: xr.DataArray, boundary: str, depth: float) -> str:
     """Return a warning if a surface is too steep for small slopes, else ''.
 
     Parameters
@@ -190,11 +210,11 @@ def slope_warning(height: xr.DataArray, boundary: str, approach: float) -> str:
     height : DataArray, dims (x, y)
         The rigid profile. [m]
     boundary : {"free", "periodic", "mirror"}
-        In free space only cells whose undeformed gap is at most the approach can touch, and only their slopes count.
-    approach : float
-        Largest approach at kept times, from the highest cell. [m]
+        Boundary of the grid.
+    depth : float
+        Depth of the loaded surface below the highest cell: in free space the largest approach at kept times, otherwise
+        :func:`loaded_depth`. Only its slopes count. [m]
     """
-    depth = approach if boundary == "free" else math.inf
     slope = math.sqrt(squared_slopes(height, boundary == "periodic", depth).mean())
     if not slope > LARGEST_SLOPE:
         return ""

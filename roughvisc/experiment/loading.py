@@ -14,7 +14,15 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import EdgeContactError, InputError
-from roughvisc.experiment.accuracy import area_error, border_warning, error_columns, memory_of, slope_warning, wakes_of
+from roughvisc.experiment.accuracy import (
+    area_error,
+    border_warning,
+    error_columns,
+    loaded_depth,
+    memory_of,
+    slope_warning,
+    wakes_of,
+)
 from roughvisc.experiment.base import Experiment, Outgrown, Row, Rows
 from roughvisc.experiment.profile import BEYOND, GROWTH, Domain, Profile, choose_surface
 from roughvisc.experiment.resources import WORTH_ASKING, require_loading
@@ -323,8 +331,11 @@ class LoadingRows(Rows):
             )
             note = " A slide takes one cell a step: its error falls with the square of the cell side."
             warnings["tolerance"] += note if program.slides else ""
-        approach = float(np.fmax.reduce(dataset["approach"].values)) - profile.least_gap  # below the highest cell
-        warnings["slope"] = slope_warning(profile.height[self.domain.cells], boundary, approach)
+        if boundary == "free":
+            depth = float(np.fmax.reduce(dataset["approach"].values)) - profile.least_gap
+        else:
+            depth = loaded_depth(profile.height, float(dataset["contact_fraction"].max()))
+        warnings["slope"] = slope_warning(profile.height[self.domain.cells], boundary, depth)
         if boundary == "periodic":
             warnings["border"] = border_warning(profile.height)
         if self.state.border is not None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import ConvergenceError, InputError
-from roughvisc.experiment.accuracy import border_warning, slope_warning, stands_alone, wake_warning
+from roughvisc.experiment.accuracy import border_warning, loaded_depth, slope_warning, stands_alone, wake_warning
 from roughvisc.experiment.base import Experiment, Row, Rows
 from roughvisc.experiment.grid_error import coarser_shape, counting_error, grid_errors, grid_uncertainty, hidden_opening
 from roughvisc.experiment.profile import Profile
@@ -259,7 +259,7 @@ class SlidingRows(Rows):
         height, speeds = self.problem.height, dataset["speed"].values.tolist()
         left = dict(zip(speeds, dataset["creep_left"].values.tolist(), strict=True))
         warnings = {
-            "slope": slope_warning(height, "periodic", np.inf),
+            "slope": slope_warning(height, "periodic", loaded_depth(height, float(dataset["contact_fraction"].max()))),
             "border": border_warning(height),
             "wake": wake_warning(left, self._period),
         }

@@ -20,6 +20,7 @@ from scipy import fft, ndimage
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
+from roughvisc.experiment.accuracy import loaded_depth
 from roughvisc.mechanics.sheet import BASE, Base, Sheet, factors
 from roughvisc.observables.frames import expect_result, history
 from roughvisc.topography.borders import border_mismatch
@@ -137,8 +138,11 @@ class Scene:
 
     @cached_property
     def loaded_slope(self) -> float:
-        """Root mean square slope of the loaded surface: in free space, of the part above the largest approach. [-]"""
-        depth = float(self.dataset["approach"].max()) if self.boundary == "free" else math.inf
+        """Root mean square slope of the loaded surface, as the warning of a result judges it. [-]"""
+        if self.boundary == "free":
+            depth = float(self.dataset["approach"].max())
+        else:
+            depth = loaded_depth(self.height, float(self.dataset["contact_fraction"].max()))
         slope = rms_slope(self.height, self.boundary == "periodic", depth)
         if math.isnan(slope):
             raise NotKnown("The result contains no loaded heights.")
