@@ -28,6 +28,8 @@ _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 _HEADING = re.compile(r"(?P<name>.*?)\s*(\[\s*(?P<square>[^\[\]]*?)\s*\]|\(\s*(?P<round>[^()]*?)\s*\))")
 #: The same pattern if the separator is a blank.
 _HEADING_BETWEEN_BLANKS = re.compile(r"[^ \t\[(]+(?:[ \t]*(?:\[[^\]]*\]|\([^)]*\)))?")
+#: Beginning of the comment with the names of the columns in a text export of JPK.
+_JPK_NAMES = "# fancyNames:"
 #: Number of rows in which the heading is sought.
 _FIRST = 200
 
@@ -164,7 +166,8 @@ def read_table(path: str | Path, wanted: Mapping[str, Wanted]) -> tuple[dict[str
     Notes
     -----
     The heading is the first line with all columns, each as ``name [unit]`` or ``name (unit)``, in any order and next to
-    others. Lines above it are skipped. A column of pure numbers may omit its unit.
+    others. Lines above it are skipped. A column of pure numbers may omit its unit. In a text export of JPK names and
+    units are comments before each segment; all segments are read as one table.
     """
     path = Path(path)
     separator, rows = _rows(path)
@@ -205,7 +208,10 @@ def _rows(path: Path) -> tuple[str, list[_Row]]:
         text = read_text(path)
     except (OSError, UnicodeError) as error:
         raise InputError(f"{path}: cannot be read as a table: {error}") from error
-    lines = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
+    whole = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip()]
+    lines = [(i, line) for i, line in whole if not line.startswith("#")]
+    if any(line.startswith(_JPK_NAMES) for _, line in whole):
+        return " ", _jpk_rows(path, whole)
     if not lines:
         return ",", []
     last = lines[-1][1]  # a row of numbers; the first lines may belong to no table
@@ -222,6 +228,31 @@ def _rows(path: Path) -> tuple[str, list[_Row]]:
     return separator, rows
 
 
+def _jpk_rows(path: Path, lines: Sequence[tuple[int, str]]) -> list[_Row]:
+    """Return one heading and the rows of all segments of a text export of JPK.
+
+    A segment may have other columns than the first one: its cells are put in the order of the first heading.
+    """
+    rows: list[_Row] = []
+    heading: list[str] = []
+    places: list[int] = []
+    names: list[str] = []
+    for i, line in lines:
+        if not line.startswith("#"):
+            cells = line.split()
+            if len(cells) != len(heading):
+                raise InputError(f"{path}, line {i}: found {len(cells)} cells: expected {len(heading)}, as above")
+            rows.append((i, [cells[place] if place >= 0 else "" for place in places]))
+            continue
+        if line.startswith(_JPK_NAMES):
+            names = re.findall('"([^"]*)"', line)
+        elif line.startswith("# units:"):
+            heading = [f"{name} [{unit}]" for name, unit in zip(names, line.split()[2:], strict=False)]
+            rows = rows or [(i, heading)]
+            places = [heading.index(cell) if cell in heading else -1 for cell in rows[0][1]]
+    return rows
+
+
 def _between_blanks(line: str) -> list[str]:
     """Split a row of numbers at blanks and tabs, but not at no-break blanks; return nothing for any other line."""
     cells = re.split(r"[ \t]+", line.strip(" \t"))
@@ -229,10 +260,16 @@ def _between_blanks(line: str) -> list[str]:
 
 
 def _places(heading: Sequence[str], name: str) -> list[int]:
-    """Return the positions of a column in a heading: by its full name, or else by its name without the unit."""
-    cells, plain = [_plain(cell) for cell in heading], _plain(name_and_unit(name)[0])
-    exact = [at for at, cell in enumerate(cells) if cell == _plain(name)]
-    return exact or [at for at, cell in enumerate(cells) if name_and_unit(cell)[0] == plain]
+    """Return the positions of a column in a heading: by its full name, or else by its name without the unit.
+
+    Parentheses at the end of a name may belong to it, as in ``Height (measured)``.
+    """
+    cells = [_plain(cell) for cell in heading]
+    bare = [name_and_unit(cell)[0] for cell in cells]
+    for names, wanted in ((cells, name), (bare, name), (bare, name_and_unit(name)[0])):
+        if places := [place for place, cell in enumerate(names) if cell == _plain(wanted)]:
+            return places
+    return []
 
 
 def _plain(name: str) -> str:
@@ -258,7 +295,8 @@ def _factor(path: Path, line: int, names: Sequence[str], key: str, one: Wanted) 
     if len(names) > 1:
         raise InputError(f"{where}: {key} = {one.name!r} fits the columns {', '.join(names)}: expected one")
     given = name_and_unit(names[0])[1]
-    stated = name_and_unit(one.name)[1] or (one.unit if one.unit in ("1", *FREQUENCY_UNITS) else "")
+    stated = "" if _plain(name_and_unit(names[0])[0]) == _plain(one.name) else name_and_unit(one.name)[1]
+    stated = stated or (one.unit if one.unit in ("1", *FREQUENCY_UNITS) else "")
     if given and stated and given != stated and one.unit != "1":
         problem = f"the heading says {given!r} and the study {stated!r}"
         raise InputError(f"{where}: unit of {key}: {problem}: expected one unit")

@@ -56,7 +56,10 @@ def read_program(path: str | Path, **columns: Any) -> Program:
     -----
     Columns may be separated by semicolons, tabs, commas or blanks. The heading is the first line that contains both
     names; lines above it are skipped. Upper and lower case do not matter. The unit is in the heading, as
-    ``Force [mN]`` or ``Force (mN)``, or in the name given here. Two rows at the same time are a jump.
+    ``Force [mN]`` or ``Force (mN)``, or in the name given here. Two rows at the same time are a jump. A text export of
+    JPK has names and units in comments before each segment, such as ``"Series Time"`` and ``"Vertical Deflection"``.
+
+    Adhesion is not modelled: a record with a pull-off ends at the end of its hold.
     """
     control, times, values, note = read_history(path, **columns)
     return Program.table(times, values, control, note)
@@ -98,11 +101,20 @@ def read_history(
     if control in LEAST and lowest < 0:
         highest = max(float(values.max()), 0.0)
         if lowest < -_NOISE * highest:
-            turn = " Does the machine count compression negative? Then factor = -1." if -lowest > highest else ""
-            raise InputError(
-                f"{path}: {control} falls to {lowest:.3g} {unit} at {times[values.argmin()]:g} s: expected none below "
-                f"zero by more than {100 * _NOISE:g} % of the largest {control} (`zero` takes an offset off).{turn}"
-            )
+            below = np.flatnonzero(values < -_NOISE * highest)
+            expected = f"none below zero by more than {100 * _NOISE:g} % of the largest {control}"
+            if -lowest > highest:
+                advice = "Does the machine count compression negative? Then factor = -1."
+            elif below[0] > values.argmax():
+                advice = (
+                    "A pull-off is adhesion, which is not modelled: delete the rows after the end of the hold, at the "
+                    f"latest from line {lines[below[0]]} on ({times[below[0]]:g} s)."
+                )
+            else:
+                advice = "`zero` takes an offset off."
+            reached = f"{control} falls to {lowest:.3g} {unit} at {times[values.argmin()]:g} s"
+            message = f"{path}: {reached}: expected {expected}. {advice}"
+            raise InputError(message, key=control, found=lowest, expected=expected)
         notes.append(f"{(values < 0).sum()} rows below zero count as zero, the lowest {lowest:.3g} {unit}")
         values = np.maximum(values, 0.0)
     tolerance = limit * largest if is_part else limit

@@ -19,6 +19,29 @@ NAMES = {"time": "t", "load": "F"}
 TIMES, LOADS = (0, 1, 3, 3.5), (0, 0.2, 0.2, 0)
 
 
+#: Text export of JPK: the second segment has its columns in another order, and one more.
+JPK = """# TEXT EXPORT
+# springConstant: 0.5
+#
+# segment: extend
+# columns: height vDeflection seriesTime
+# fancyNames: "Deflection" "Deflection (vertical)" "Series Time"
+# units: m mN s
+#
+2e-6 0 0
+0 2.0e+2 1
+
+#
+# segment: pause
+# columns: seriesTime vDeflection height time
+# fancyNames: "Series Time" "Deflection (vertical)" "Deflection" "Segment Time"
+# units: s mN m s
+#
+3 200 0 0
+3.5 0 0 0.5
+"""
+
+
 def write(folder, text, encoding="utf-8"):
     path = folder / "machine.csv"
     path.write_bytes(text.encode(encoding))
@@ -82,8 +105,9 @@ def test_thin__is_swept(read, tmp_path):
             {"time": "Prüfzeit", "load": "Kraft"},
         ),
         ("t [s],F\n0,0\n1,0.2\n3,0.2\n3.5,0", "utf-8", {"time": "t", "load": "F [N]"}),
+        (JPK, "utf-8", {"time": "Series Time", "load": "Deflection (vertical)"}),
     ],
-    ids=["commas", "semicolons", "german", "unit by hand"],
+    ids=["commas", "semicolons", "german", "unit by hand", "jpk"],
 )
 def test_columns__by_name_in_their_units(tmp_path, text, encoding, names):
     assert rv.read_program(write(tmp_path, text, encoding), **names) == Program.table(TIMES, LOADS)
@@ -100,6 +124,10 @@ def test_columns__by_name_in_their_units(tmp_path, text, encoding, names):
         ("t [s],F [N]\n0,0\n1,1\n1,2\n1,3", NAMES, "lines 3 to 5"),
         ("t [s],F [N]\n0,0\n1,1\n2,-0.1", NAMES, "load"),
         ("t [s],F [N]\n0,0\n1,-1", NAMES, "factor"),
+        ("t [s],F [N]\n0,0\n1,1\n2,1\n3,-0.005\n4,-0.1\n5,-0.2", NAMES, "adhesion.* line 6"),
+        (JPK + "4 100", {"time": "Series Time", "load": "Deflection (vertical)"}, "line 20"),
+        (JPK, {"time": "Segment Time", "load": "Deflection (vertical)"}, "Series Time"),
+        (JPK.replace("s mN m s", "s N m s"), {"time": "Series Time", "load": "Deflection (vertical)"}, "line 18"),
         ("t [s],F [N]\nx0,y0\n1,0.2\n2,0.3", NAMES, "line 2"),
     ],
 )
@@ -124,6 +152,11 @@ def test_noise_below_zero__counts_as_zero_up_to_its_limit(tmp_path):
     write(tmp_path, "t [s],F [mN]\n0,-1.1\n1,100")
     with pytest.raises(rv.InputError, match=r"machine\.csv: load falls to -0\.0011 N"):
         rv.read_program(path, time="t", load="F", thin=0)
+
+
+def test_thinned__keeps_the_ends_of_straight_lines():
+    times = np.arange(60.0)
+    assert thinned(times, np.minimum(times, 30.0), 1e-9).tolist() == [0, 30, 59]
 
 
 @examples(60)
