@@ -24,11 +24,12 @@ from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.program import Program
 from roughvisc.settings import Settings
 from roughvisc.study.case_text import value_text
-from roughvisc.study.study_file import in_si, parts_of, shift_factor, unit_of, with_files
+from roughvisc.study.study_file import in_si, parts_of, shift_factor, unit_of, with_files, without_late_times
 from roughvisc.study.sweep_table import SURROGATE, place, sweep_changes, value_at
 from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.readers import sha256
 from roughvisc.topography.scans import is_card, measured_file, read_card, read_toml, surface_height
+from roughvisc.units import format_quantity
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -65,6 +66,9 @@ class Case:
         The study file.
     varied : mapping
         Values that a sweep or :func:`vary` set: dotted key -> value in SI.
+    late_times : tuple of float
+        Times of the study that are not kept, because in this case of its sweep they are after the end of the program.
+        [s]
     title : str
         Title of the study.
     body : Body
@@ -78,6 +82,7 @@ class Case:
     tables: Mapping[str, Any]
     origin: Path | None
     varied: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
+    late_times: tuple[float, ...] = field(default=(), kw_only=True, compare=False)
     title: str = field(compare=False)
     body: Body = field(compare=False)
     experiment: Experiment = field(compare=False)
@@ -99,6 +104,15 @@ class Case:
     def material(self) -> Material:
         """The material."""
         return self.body.material
+
+    @property
+    def note(self) -> str:
+        """The times that are left out, and how a measured history became segments; empty if there is nothing to say."""
+        notes = [self.experiment.program.note] if isinstance(self.experiment, Loading) else []
+        if self.late_times:
+            late = ", ".join(format_quantity(time, "s") for time in self.late_times)
+            notes.append(f"Times after the end of the program are left out: {late}.")
+        return " ".join(filter(None, notes))
 
     @property
     def shift_factor(self) -> float:
@@ -243,6 +257,8 @@ def read_cases(path: str | Path) -> list[Case]:
     path : path
         A TOML file; files that it names are sought relative to it.
 
+    In a sweep over programs a case leaves out the times of ``keep.times`` after the end of its own program.
+
     Returns
     -------
     list of Case
@@ -251,7 +267,7 @@ def read_cases(path: str | Path) -> list[Case]:
     Raises
     ------
     InputError
-        As :func:`read_study` does, for the first case that is wrong.
+        As :func:`read_study` does, for the first case that is wrong; or if a time is after the end of every program.
     """
     path = Path(path)
     if not path.exists():
@@ -264,10 +280,13 @@ def read_cases(path: str | Path) -> list[Case]:
     cases = []
     for number, (change, drawn) in enumerate(changes):
         try:
-            cases.append(_case_of(data, path, path.parent, change, drawn))
+            cases.append(_case_of(data, path, path.parent, change, drawn, leaves_out=True))
         except InputError as error:
             values = ", ".join(f"{key} = {short_repr(value)}" for key, value in {**change, **drawn}.items())
             raise error.prefixed(f"{path}: case {number} ({values})" if values else str(path)) from error
+    if always_late := set.intersection(*(set(case.late_times) for case in cases)):
+        expected = "times up to the end of the longest program"
+        raise InputError(key="keep.times", found=max(always_late), expected=expected).prefixed(str(path))
     return cases
 
 
@@ -303,6 +322,8 @@ def _case_of(
     folder: Path | None = None,
     changes: Mapping[str, Any] = MappingProxyType({}),
     drawn: Mapping[str, int] = MappingProxyType({}),
+    *,
+    leaves_out: bool = False,
 ) -> Case:
     """Return the checked case of the tables of a study after changes.
 
@@ -318,12 +339,17 @@ def _case_of(
         Dotted key -> value.
     drawn : mapping
         Number of the realisation, if the case is one.
+    leaves_out : bool
+        Whether to leave out times after the end of a changed program, instead of refusing them.
     """
     for key, value in changes.items():
         data = place(data, key, value)
     try:
         tables = with_files(data, folder)
-        case = Case(tables, origin, **parts_of(tables))
+        late: tuple[float, ...] = ()
+        if leaves_out and any(key.partition(".")[0] == "program" for key in changes):
+            tables, late = without_late_times(tables)
+        case = Case(tables, origin, late_times=late, **parts_of(tables))
     except InputError as error:
         for key in (error.key, error.key.rpartition(".")[0]):
             file = value_at(data, f"{key}.file", None)

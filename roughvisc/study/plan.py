@@ -382,7 +382,7 @@ def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Availab
     arrays: Callable[[float], float] = partial(curve_bytes, settings)
     if isinstance(own, LoadingRows):
         scene, program, model, area = own.scene, own.scene.program, own.scene.memory.note, own.area
-        kind, force, note = "slide" if program.slides else "load", max(force, program.largest_load), case.program.note
+        kind, force, note = "slide" if program.slides else "load", max(force, program.largest_load), case.note
         rows = run.kept * run.steps if scene.kept is None else float(len(scene.kept))
         arrays = partial(march_bytes, settings, scene.memory, contact=float(run.contact[-1]), part=part)
 

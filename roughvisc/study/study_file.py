@@ -195,6 +195,25 @@ def with_files(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
     return tables
 
 
+def without_late_times(tables: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[float, ...]]:
+    """Return the tables of a study without the listed times after the end of its program, and these times. [s]
+
+    Parameters
+    ----------
+    tables : mapping
+        As :func:`with_files` returns them. If no time would be left, they are returned unchanged.
+    """
+    times = value_at(tables, "keep.times", None)
+    late: list[float] = []
+    if isinstance(times, list) and "program" in tables:
+        end = program_of(tables["program"]).duration * (1 + _ROUNDING)
+        late = [time for time in times if isinstance(time, int | float) and time > end]
+    if not 0 < len(late) < len(times or ()):
+        return dict(tables), ()
+    kept = [time for time in times if time not in late]
+    return {**tables, "keep": {**tables["keep"], "times": kept}}, tuple(late)
+
+
 def with_columns(where: str, stated: Any) -> dict[str, Any]:
     """Return a table of a material with the columns of its CSV file, without the name of the file."""
     table = a_table(where, stated)

@@ -170,6 +170,9 @@ def run_cases(
                 outcomes[key] = outcome_of(entry, reused=True)
         todo = {key: case for key, case in distinct.items() if key not in outcomes}
         log.info("sweep of %d cases, %d of them to compute", len(distinct), len(todo))
+        for key, case in distinct.items():
+            if case.late_times:
+                log.info("%s: %s", key, case.note)
         display.begin(cases, numbers_of(listed))
         for outcome in outcomes.values():
             display.ended(outcome)

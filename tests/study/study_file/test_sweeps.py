@@ -3,8 +3,9 @@
 import pytest
 from support import refused
 
+import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.study.case import read_study, vary
+from roughvisc.study.case import Case, read_study, vary
 
 ROUGH = {"generate": "self_affine", "size": "1 mm", "shape": [9, 7], "hurst": 0.8, "rms_slope": 0.1, "seed": 5}
 GAUSSIAN = ROUGH | {"amplitudes": "gaussian"}
@@ -27,6 +28,29 @@ def test_lists__entry_by_entry_table_after_table(read):
     cases = read(sweep=[{"program.0.load": [1, 2], "solve.tolerance": [1e-3, 1e-4]}, {"program.0.load": 3}])
     found = [(case.program.segments[0].end, case.settings.tolerance) for case in cases]
     assert found == [(1, 1e-3), (2, 1e-4), (3, 1e-3)]
+
+
+def test_times__after_the_end_of_a_program_are_left_out_of_its_case(read, tmp_path):
+    holds = {"program.1.hold": [0.1, "1 s"]}
+    changes = {"surface.shape": [12, 9], "program.0.load": "1 mN", "keep.times": [0.05, "0.1 s", 1], "keep.fields": []}
+    cases = read(changes, sweep=holds)
+    assert [case.settings.times for case in cases] == [(0.05, 0.1), (0.05, 0.1, 1.0)]
+    assert [case.late_times for case in cases] == [(1.0,), ()]
+    assert Case.from_json(cases[0].to_json()).key == cases[0].key
+    assert read(changes | {"keep.times": [0.05, 0.1], "program.1.hold": 0.1})[0].key == cases[0].key
+    assert [("1 s" in note) for note in rv.plan(cases).note.values] == [True, False]
+    done = rv.sweep(cases, tmp_path, workers=0, progress=False)
+    assert done.time.count("row").values.tolist() == [2, 3]
+    (log,) = (line for path in tmp_path.glob("*.log") for line in path.read_text().splitlines() if "left out" in line)
+    assert cases[0].key in log
+    for short in (
+        changes | {"program.1.hold": 0.1},
+        changes | {"program.1.hold": 0.1, "sweep": {"material.poisson": [0.4, 0.5]}},
+        changes | {"keep.times": [0.1, 3], "sweep": holds},
+        changes | {"keep.times": [3], "sweep": holds},
+    ):
+        with refused("keep.times"):
+            read(short)
 
 
 def test_pattern__stands_for_the_files_that_match_it(read, tmp_path):
