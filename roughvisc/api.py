@@ -37,7 +37,7 @@ def simulate(
     boundary: Boundary = Settings.boundary,
     tolerance: float = Settings.tolerance,
     times: int | Sequence[float | str] | str | None = Settings.times,
-    fields: Sequence[str] = Settings.fields,
+    fields: Sequence[str] | str = Settings.fields,
     missing: Missing = Settings.missing,
     edge: Edge = Settings.edge,
     grid_error: bool | Literal["auto"] = Settings.grid_error,
@@ -73,7 +73,7 @@ def simulate(
         Output times, reached exactly. A whole number: how many rows, counting time zero and the corners of the program,
         the others where the result changes most. A list, or one text with a unit: the times. None, in a study
         ``"all"``: all corners and every accepted step whose stated error is at most half the tolerance. [s]
-    fields : sequence of str
+    fields : sequence of str, or str
         Fields to keep: any of ``pressure``, ``gap``, ``displacement``.
     missing : {"refuse", "absent"}
         Whether missing heights are an error, or cells without material that never touch.
@@ -144,7 +144,7 @@ def friction(
     direction: Direction = "x",
     boundary: Boundary = Settings.boundary,
     tolerance: float = Settings.tolerance,
-    fields: Sequence[str] = (),
+    fields: Sequence[str] | str = (),
     grid_error: bool | Literal["auto"] = Settings.grid_error,
     numerics: Numerics = Numerics(),
     threads: int | None = None,
@@ -171,7 +171,7 @@ def friction(
         expects a nominal pressure. ``auto`` is ``periodic``.
     tolerance : float
         Tolerance on the iteration errors of pressure (L1, over the load) and friction (relative).
-    fields : sequence of str
+    fields : sequence of str, or str
         Fields to keep: any of ``pressure`` and ``gap``, in the frame of the profile.
     grid_error : "auto" or bool
         Whether to estimate the grid errors ``grid_error_friction`` and ``grid_error_area`` from the same curve on cells
@@ -293,11 +293,11 @@ def run(
     ConvergenceError
         If the contact of a step or at a speed is not solved; no result is written.
     """
-    from roughvisc.study.case import Case, read_study
+    from roughvisc.study.case import case_given
     from roughvisc.study.execution.run import result_folder, run_case
     from roughvisc.study.storage.netcdf import open_result
 
-    stated = case if isinstance(case, Case) else read_study(case)
+    stated = case_given(case)
     if want is None:
         return open_result(run_case(stated, result_folder(stated, out), progress=progress, threads=threads))
     from roughvisc.study import target

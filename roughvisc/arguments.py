@@ -167,6 +167,11 @@ def one_of(key: str, value: Any, words: Iterable[Any]) -> Any:
     return value
 
 
+def listed_names(value: Any) -> tuple[Any, ...]:
+    """Return the names of a list of names; a text is one name, and any other value a wrong one."""
+    return tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else (value,)
+
+
 def a_table(where: str, value: Any) -> dict[str, Any]:
     """Return a copy of the value if it is a table; refuse it otherwise."""
     if not isinstance(value, Mapping):

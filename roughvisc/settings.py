@@ -8,7 +8,7 @@ experiment follow from the fields.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from roughvisc.arguments import listed_names
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.program import Program, instant
@@ -123,7 +124,7 @@ class Settings(Numerics):
     boundary: Boundary = "auto"
     tolerance: float = 1e-3
     times: int | Sequence[float | str] | str | None = None
-    fields: Sequence[str] = ("pressure", "gap")
+    fields: Sequence[str] | str = ("pressure", "gap")
     edge: Edge = "error"
     missing: Missing = "refuse"
     grid_error: bool | Literal["auto"] = "auto"
@@ -136,8 +137,10 @@ class Settings(Numerics):
             times = int(number(int(times), "1", "times", least=1, most=MOST_TIMES))
         elif times is not None:
             times = tuple(np.unique(listed(times, "s", "times", "a whole number counts rows")).tolist())
-        names = tuple(self.fields) if isinstance(self.fields, Iterable) else (self.fields,)
-        if not set(names) <= set(FIELDS):
+            if not times:
+                raise InputError(key="times", found=self.times, expected="at least one time [s], or None")
+        names: Any = listed_names(self.fields)
+        if not all(name in FIELDS for name in names):
             raise InputError(key="fields", found=self.fields, expected=f"some of {', '.join(FIELDS)}")
         grid_error = self.grid_error if self.grid_error == "auto" else bool(self.grid_error)
         found = {"tolerance": tolerance, "times": times, "fields": names, "grid_error": grid_error}

@@ -162,10 +162,10 @@ def in_si(value: Any, unit: str, name: str) -> Any:
     return type(value)([in_si(one, unit, f"{name}[{place}]") for place, one in enumerate(value)])
 
 
-def listed(value: Any, unit: str, key: str, rows: str) -> NDArray[np.float64]:
+def listed(value: Any, unit: str, key: str, otherwise: str = "") -> NDArray[np.float64]:
     """Return the quantities of a list, or of one text with a unit, as an array of numbers.
 
-    A bare number is refused: it could be a quantity as well as a number of rows.
+    A bare number is refused: it could also be a number of rows.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def listed(value: Any, unit: str, key: str, rows: str) -> NDArray[np.float64]:
         Unit of the result.
     key : str
         Name of the list in messages.
-    rows : str
+    otherwise : str
         What a bare whole number means, for the message.
 
     Raises
@@ -191,10 +191,12 @@ def listed(value: Any, unit: str, key: str, rows: str) -> NDArray[np.float64]:
     plain = np.asarray(value).tolist() if hasattr(value, "dtype") else value
     if isinstance(plain, str):
         return np.array([number(plain, unit, key)])
-    if not isinstance(plain, Iterable) or isinstance(plain, Mapping | Set):
-        is_number = isinstance(plain, Real) and not isinstance(plain, bool)
-        written = f"[{plain:g}] or '{plain:g} {unit}'" if is_number else f"a list [{unit}], or text with a unit"
-        raise InputError(key=key, found=value, expected=f"{written}; {rows}")
+    if not isinstance(plain, Iterable) or isinstance(plain, Mapping | Set | bytes):
+        pure = unit in ("", "1")
+        expected = "a list of numbers" if pure else f"a list [{unit}], or text with a unit"
+        if isinstance(plain, Real) and not isinstance(plain, bool):
+            expected = f"[{plain:g}]" if pure else f"[{plain:g}] or '{plain:g} {unit}'"
+        raise InputError(key=key, found=value, expected="; ".join(filter(None, (expected, otherwise))))
     entries = list(plain)
     if {float, int}.issuperset(map(type, entries)):
         return np.array(entries, dtype=float)
@@ -205,7 +207,8 @@ def quantities(**units: str) -> Callable[[_Taking], _Taking]:
     """Decorate a function or a dataclass whose named arguments are numbers in SI or text with a unit.
 
     Text is converted before the call. An argument whose unit is followed by ``> 0`` or ``>= 0`` is one such number, or
-    None if that is its default. Other values are passed on unchanged.
+    None if that is its default; one whose unit is followed by ``...`` is a list of numbers.
+    Other values are passed on unchanged. Wrong names of arguments are refused with the name of the function.
 
     Parameters
     ----------
@@ -223,20 +226,31 @@ def quantities(**units: str) -> Callable[[_Taking], _Taking]:
     Traceback (most recent call last):
     InputError: radius: found '2 s', in second: expected a number [m], or text with a unit, above 0
     """
-    declared = {name: stated.partition(" >")[::2] for name, stated in units.items()}
+    declared = {name: stated.removesuffix(" ...").partition(" >")[::2] for name, stated in units.items()}
+    lists = {name for name, stated in units.items() if stated.endswith(" ...")}
 
     def decorate(function: Any) -> Any:
         if isinstance(function, type):
             function.__init__ = decorate(function.__init__)  # type: ignore[misc]
             return function
         taking = signature(function)
+        owner = function.__qualname__.removesuffix(".__init__")
 
         @wraps(function)
         def called(*args: Any, **given: Any) -> Any:
-            bound = taking.bind(*args, **given)
+            try:
+                bound = taking.bind(*args, **given)
+            except TypeError as error:
+                unknown = [name for name in given if name not in taking.parameters]
+                problem = f"unexpected argument {unknown[0]!r}" if unknown else str(error)
+                names = ", ".join(name for name in taking.parameters if name != "self")
+                raise TypeError(f"{owner}(): {problem}: expected {names}") from None
             for name in filter(bound.arguments.__contains__, declared):
                 (unit, limit), value = declared[name], bound.arguments[name]
-                if not limit or (value is None and taking.parameters[name].default is None):
+                if name in lists:
+                    numbers = listed(value, unit, name).tolist()
+                    bound.arguments[name] = tuple(numbers) if isinstance(value, tuple) else numbers
+                elif not limit or (value is None and taking.parameters[name].default is None):
                     bound.arguments[name] = in_si(value, unit, name)
                 else:
                     bound.arguments[name] = number(value, unit, name, **{"least" if limit == "= 0" else "above": 0.0})

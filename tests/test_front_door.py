@@ -3,6 +3,7 @@
 import inspect
 import subprocess
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -49,6 +50,53 @@ RUBBER = rv.zener(shear_modulus="3 MPa", kelvin_modulus="1 MPa", kelvin_viscosit
 def test_quantity__in_a_unit_of_another_kind_is_refused(call, key):
     with refused(key, "1 kat"):
         call("1 kat")
+
+
+ROWS = {"times": [0.0, 1.0, 2.0], "poisson": 0.4}
+PRESS = rv.Program().load(1.0, over=1.0)
+SCENE = {"height": WAVE, "material": RUBBER, "progress": False}
+CALLS = [
+    (rv.simulate, SCENE | {"program": PRESS, "boundary": "periodic", "times": 2, "fields": ("gap",)}),
+    (rv.friction, SCENE | {"speeds": [1.0], "pressure": 1e4, "fields": "gap"}),
+    (rv.elastic, {"shear_modulus": 1e6, "poisson": 0.4}),
+    (rv.maxwell, {"shear_modulus": 1e6, "viscosity": 1e5, "poisson": 0.4}),
+    (rv.power_law, {"glassy": 1e-7, "coefficient": 1e-6, "exponent": 0.5, "poisson": 0.4}),
+    (rv.Prony, {"glassy": 1e-6, "compliances": (1e-6,), "times": (1.0,), "poisson": 0.4}),
+    (rv.from_relaxation, {"equilibrium": 1e6, "moduli": [1e6], "times": [1.0], "poisson": 0.4}),
+    (rv.from_relaxation, {"instantaneous": 1e6, "ratios": [0.5], "times": [1.0]}),
+    (rv.creep_table, ROWS | {"compliances": [1e-6, 2e-6, 3e-6], "noise": 0.1}),
+    (rv.relaxation_table, ROWS | {"moduli": [3e6, 2e6, 1e6]}),
+    (
+        partial(rv.dynamic_table, frequency_unit="Hz"),
+        {"frequencies": [1, 10], "storage": [1e6, 2e6], "loss": [1e5, 2e5], "shift_factors": 1.0, "poisson": 0.4},
+    ),
+    (rv.Program.table, {"times": [0], "values": [1]}),
+    (rv.Program.cycle, {"mean": 1.0, "amplitude": 0.5, "period": 1.0, "cycles": 2.0}),
+    (rv.run, {"case": None}),
+    (rv.trade, {"case": None}),
+    (rv.budget, {"case": None}),
+    (partial(rv.vary, changes={}), {"case": None}),
+    (rv.plan, {"cases": None}),
+    (rv.sweep, {"cases": None}),
+    (rv.observe, {"cases": None}),
+    (rv.over_realisations, {"values": None}),
+]
+
+
+@pytest.mark.parametrize(("function", "arguments"), CALLS)
+def test_wrong_type__is_refused_at_the_argument(function, arguments):
+    for name in arguments.keys() - {"progress", "height", "material"}:
+        for wrong in (object(), b"1", [object()], rv.Case, ["1 kat"], [True]):
+            with pytest.raises(rv.InputError) as caught:
+                function(**{**arguments, name: wrong})
+            assert caught.value.key.partition("[")[0].partition(".")[0] == name, wrong
+
+
+def test_missing_argument__names_the_function():
+    with pytest.raises(TypeError, match=r"^maxwell\(\).*'G'"):
+        rv.maxwell(G=1e6, viscosity=1e5)
+    with pytest.raises(TypeError, match=r"^Prony\(\).*'glassy'"):
+        rv.Prony(times=[1.0])
 
 
 def test_text__is_the_number():

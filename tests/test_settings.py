@@ -62,6 +62,7 @@ def test_numerics__are_checked(name):
 def test_settings__are_one_frozen_value():
     one = Settings(times=np.array([0.5, 0.25, 0.5]), fields=["gap"], time_step="1 s")
     assert one == Settings(times=(0.25, 0.5), fields=("gap",), time_step=1.0)
+    assert Settings(fields="gap").fields == vary(STUDY, {"keep.fields": "gap"}).settings.fields == ("gap",)
     assert Settings(times="0.5 s").times == Settings(times=[0.5]).times == (0.5,)
     assert len({one, Settings(times=[0.25, 0.5], fields=iter(["gap"]), time_step=1.0)}) == 1
     with pytest.raises(FrozenInstanceError):

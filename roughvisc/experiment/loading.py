@@ -93,6 +93,11 @@ class Loading(Experiment):
 
     axis: ClassVar[str] = "time"
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.program, Program):
+            expected = "a program, such as rv.Program().load(1, over=1)"
+            raise InputError(key="program", found=self.program, expected=expected)
+
     def __repr__(self) -> str:
         return repr(self.program)
 

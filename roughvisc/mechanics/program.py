@@ -8,7 +8,7 @@ converts nominal pressures to loads on a known area.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, update_wrapper
 from itertools import accumulate, pairwise
@@ -394,6 +394,9 @@ class Program:
         Program: load to 2 N over 1 s, load to 500 mN at once, load to 1 N over 1 s
         """
         unit = UNITS[one_of("control", control, UNITS)]
+        for key, column, si in (("times", times, "s"), ("values", values, unit)):
+            if isinstance(column, str | bytes | Mapping) or not hasattr(column, "__len__"):
+                raise InputError(key=key, found=column, expected=f"a list [{si}]")
         if len(times) != len(values) or not len(times):
             expected = f"as many values as times, {len(times)}, at least one"
             raise InputError(key="values", found=len(values), expected=expected)

@@ -11,7 +11,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from roughvisc.arguments import one_of
+from roughvisc.arguments import listed_names, one_of
 from roughvisc.errors import InputError
 from roughvisc.observables import history as steps_of
 from roughvisc.observables.frames import expect_result
@@ -66,7 +66,7 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
     over = over or axis
     default = ("friction_coefficient", "contact_area") if over == "sliding_distance" else _QUANTITIES
     wanted = [name for name in default if name in dataset] if quantities is None else quantities
-    names = [wanted] if isinstance(wanted, str) else list(wanted)
+    names = listed_names(wanted)
     expect_result(dataset, over, *(names or default))
     kept = dataset.sortby(axis)
     steps = steps_of(kept) if axis == "time" else kept

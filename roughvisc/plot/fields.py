@@ -17,7 +17,7 @@ from matplotlib.image import AxesImage
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from roughvisc.arguments import one_of
+from roughvisc.arguments import listed_names, one_of
 from roughvisc.errors import InputError
 from roughvisc.observables import contact, leakage
 from roughvisc.observables.frames import expect_result, need
@@ -207,7 +207,7 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
         Times [s] or speeds [m/s], as a list or one text with a unit; the nearest kept ones are drawn. Negative whole
         numbers, also a single one, count from the end. Default: up to four, evenly spread, among them the time of the
         largest contact or the speed of the largest friction.
-    fields : sequence of str
+    fields : sequence of str, or str
         Any of ``"pressure"``, ``"gap"``, ``"displacement"``; fields that are not in the result are skipped. Or
         ``"flux"`` of a leaking fluid, computed from the gap with the settings of ``leak_rate`` in the result, else
         with the defaults of :func:`roughvisc.observables.leakage`.
@@ -222,7 +222,9 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
         If the result holds none of the fields, or more than 8 times are requested.
     """
     expect_result(dataset, "x", "y")
-    fields = [fields] if isinstance(fields, str) else list(fields)
+    fields = listed_names(fields)
+    if not fields:
+        raise InputError(key="fields", found=fields, expected=f"some of {', '.join(FIELDS)}, flux")
     for name in fields:
         one_of("fields", name, (*FIELDS, "flux"))
     if "flux" in fields:

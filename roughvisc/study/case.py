@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property
 from importlib import metadata
+from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.arguments import split
+from roughvisc.arguments import a_table, split
 from roughvisc.errors import InputError, RoughviscError, short_repr
 from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
@@ -290,6 +291,28 @@ def read_cases(path: str | Path) -> list[Case]:
     return cases
 
 
+def case_given(case: Any) -> Case:
+    """Return a case, or the case of the study file at a path; refuse anything else."""
+    if isinstance(case, Case):
+        return case
+    if isinstance(case, str | PathLike):
+        return read_study(Path(case))
+    raise InputError(key="case", found=case, expected="a Case, such as rv.read_study(...), or the path of a study file")
+
+
+def cases_given(cases: Any) -> Sequence[Case]:
+    """Return a list of cases, or the cases of the study file at a path; refuse anything else."""
+    if isinstance(cases, str | PathLike):
+        return read_cases(Path(cases))
+    if not isinstance(cases, Sequence) or not cases:
+        expected = "a list of at least one case, such as rv.read_cases(...), or the path of a study file"
+        raise InputError(key="cases", found=cases, expected=expected)
+    for number, case in enumerate(cases):
+        if not isinstance(case, Case):
+            raise InputError(key=f"cases[{number}]", found=case, expected="a Case, such as rv.read_cases(...) lists")
+    return cases
+
+
 def vary(case: Case, changes: Mapping[str, Any]) -> Case:
     """Return a case with some of its values changed.
 
@@ -309,6 +332,8 @@ def vary(case: Case, changes: Mapping[str, Any]) -> Case:
     InputError
         If a key does not exist or a value is refused.
     """
+    case = case_given(case)
+    changes = a_table("changes", changes)
     try:
         changed = _case_of(case.tables, case.origin, case.origin and case.origin.parent, changes)
     except InputError as error:

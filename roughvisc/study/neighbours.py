@@ -18,12 +18,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from roughvisc.arguments import one_of
+from roughvisc.arguments import listed_names, one_of
 from roughvisc.errors import InputError, RoughviscError
 from roughvisc.experiment.grid_error import coarser_shape
 from roughvisc.experiment.loading import Loading
 from roughvisc.observables import conductance, leakage
-from roughvisc.study.case import Case, read_study, vary
+from roughvisc.study.case import Case, case_given, vary
 from roughvisc.study.execution.run import is_result_of, result_folder
 from roughvisc.study.execution.sweep import Display, run_cases
 from roughvisc.study.storage.folder import case_path
@@ -543,11 +543,10 @@ def budget(
     """
     given = dict(locals())
     known = {name: given[name] for name in KNOWN}
-    names = [quantity] if isinstance(quantity, str) else list(quantity)
+    names = listed_names(quantity)
     if not names:
-        raise InputError(key="quantity", found=names, expected="at least one")
-    if not isinstance(case, Case):
-        case = read_study(case)
+        raise InputError(key="quantity", found=quantity, expected="at least one")
+    case = case_given(case)
     finished = case_path(result_folder(case), case.key, "result")
     folder = Path(out).expanduser() if out is not None else finished.parent / FOLDER
     observed = [quantity_of(case, name) for name in names]

@@ -42,7 +42,7 @@ from roughvisc.mechanics.contact.solver import solve_contact
 from roughvisc.mechanics.grid import Grid, arrays_of, to_host
 from roughvisc.mechanics.program import Program
 from roughvisc.settings import Problem
-from roughvisc.study.case import Case, labels_of, parameters_of, read_cases
+from roughvisc.study.case import Case, cases_given, labels_of, parameters_of
 from roughvisc.study.execution.cluster import processes_that_fit, threads_each
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.storage.folder import existing_part
@@ -123,10 +123,7 @@ def plan(
     iterations on the real grid. The time is accurate to a factor of 2, memory to 1.3, disk and contact fraction to 1.2.
     In a sweep with many cases some have no coarse run, and the coarse run of the nearest case in the list is used.
     """
-    if isinstance(cases, str | Path):
-        cases = read_cases(cases)
-    if not cases:
-        raise InputError(key="cases", found=cases, expected="at least one case")
+    cases = cases_given(cases)
     folder, there = result_folder(cases[0], out), memory_available(cases[0].settings.device)
     stated = [json.loads(case.to_json()) for case in cases]
     parameters = parameters_of(stated)

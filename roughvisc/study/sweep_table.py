@@ -262,6 +262,8 @@ def over_realisations(values: xr.DataArray) -> xr.Dataset:
     >>> [round(float(found[name]), 3) for name in ("lower", "mean", "upper")]
     [0.758, 1.013, 1.364]
     """
+    if not isinstance(values, xr.DataArray):
+        raise InputError(key="values", found=values, expected="a quantity of a sweep, such as results.contact_area")
     if REALISATION not in values.dims:
         expected = f"a dimension {REALISATION!r}, as a sweep with realisations = 24 has it"
         raise InputError(key=str(values.name or "values"), found=list(values.dims), expected=expected)

@@ -10,12 +10,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from roughvisc.arguments import listed_names
 from roughvisc.errors import InputError
 from roughvisc.experiment.grid_error import TWO_GRIDS, grid_uncertainty, pressure_distance
 from roughvisc.experiment.loading import Loading
 from roughvisc.labels import cost_of
 from roughvisc.settings import kept_times
-from roughvisc.study.case import Case, read_study, vary
+from roughvisc.study.case import Case, case_given, vary
 from roughvisc.study.execution.run import result_folder
 from roughvisc.study.neighbours import (
     QUANTITIES,
@@ -98,15 +99,17 @@ def trade(
     the coarser cells. In a slide the profile moves by whole cells. Times in a slide are kept if the profile has moved
     by whole cells of every grid, which includes the beginning and the end.
     """
-    if not isinstance(case, Case):
-        case = read_study(case)
-    requested = [quantity] if isinstance(quantity, str) else list(quantity)
+    case = case_given(case)
+    requested = listed_names(quantity)
     observed = [quantity_of(case, name) for name in requested if name != "pressure"]
     known = {"pressure", *quantities_of(case)}
     names = [name for name in dict.fromkeys([*requested, *_USUAL]) if name in known]
     height = case.height()
     data, shape = is_data(case), (height.sizes["x"], height.sizes["y"])
-    rungs = _ladder(data, shape) if settings is None else [(float(one), float(grid)) for one, grid in settings]
+    try:
+        rungs = _ladder(data, shape) if settings is None else [(float(one), float(grid)) for one, grid in settings]
+    except (TypeError, ValueError) as error:
+        raise InputError(key="settings", found=settings, expected="pairs of a tolerance and a grid") from error
     if not rungs:
         raise InputError(key="settings", found=rungs, expected="at least one tolerance and grid")
     for tolerance, grid in rungs:

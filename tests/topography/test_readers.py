@@ -209,5 +209,7 @@ def test_add_format__is_read_by_suffix_and_by_name(tmp_path, monkeypatch):
     with refused("format", "magic"):
         open_scan(tmp_path / "a.our", format="magic")
     assert supported_formats()["ours"] == ("txt", "our")
+    add_format("ours", "our", read)
+    assert supported_formats()["ours"] == ("our",)
     add_format("ours", [], read)
     assert supported_formats()["ours"] == ()

@@ -31,8 +31,9 @@ _LARGEST = 300.0
 
 
 def check_poisson(poisson: float) -> None:
-    if not -1 < poisson <= 0.5:
+    if isinstance(poisson, str):  # number() reads "0.3"
         raise InputError(key="poisson", found=poisson, expected="a number above -1 and up to 0.5")
+    number(poisson, "1", "poisson", above=-1, most=0.5)
 
 
 def check_terms(name: str, terms: Sequence[float], unit: str, times: Sequence[float]) -> None:
@@ -44,7 +45,7 @@ def check_terms(name: str, terms: Sequence[float], unit: str, times: Sequence[fl
         number(time, "s", f"times[{i}]", above=0)
 
 
-@quantities(glassy="1/Pa >= 0", fluidity="1/(Pa s) >= 0", compliances="1/Pa", times="s")
+@quantities(glassy="1/Pa >= 0", fluidity="1/(Pa s) >= 0", compliances="1/Pa ...", times="s ...")
 @dataclass(frozen=True)
 class Prony:
     r"""Exponential (Prony) series of the shear creep compliance.
@@ -257,7 +258,7 @@ def creep(function: Callable[[Array], Any], poisson: float = 0.5) -> Creep:
     return Creep(function, (), poisson)
 
 
-@quantities(glassy="1/Pa >= 0", coefficient="1/Pa > 0", time_scale="s > 0")
+@quantities(glassy="1/Pa >= 0", coefficient="1/Pa > 0", exponent="1 > 0", time_scale="s > 0")
 def power_law(
     glassy: Quantity, coefficient: Quantity, exponent: float, time_scale: Quantity = 1.0, poisson: float = 0.5
 ) -> Creep:

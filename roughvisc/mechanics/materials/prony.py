@@ -154,7 +154,14 @@ def zener(shear_modulus: Quantity, kelvin_modulus: Quantity, kelvin_viscosity: Q
     return Prony(1 / shear_modulus, 0.0, (1 / kelvin_modulus,), (kelvin_viscosity / kelvin_modulus,), poisson)
 
 
-@quantities(equilibrium="Pa >= 0", moduli="Pa", times="s", instantaneous="Pa > 0", bulk_modulus="Pa > 0")
+@quantities(
+    equilibrium="Pa >= 0",
+    moduli="Pa ...",
+    times="s ...",
+    instantaneous="Pa > 0",
+    ratios="1 ...",
+    bulk_modulus="Pa > 0",
+)
 def from_relaxation(
     equilibrium: Quantity | None = None,
     moduli: Sequence[Quantity] = (),

@@ -18,7 +18,7 @@ from roughvisc.errors import InputError
 from roughvisc.mechanics.materials.creep import Prony
 from roughvisc.mechanics.materials.prony import Kind, relaxation_series, tensile_to_shear
 from roughvisc.mechanics.materials.series import lattice, nonnegative
-from roughvisc.units import Quantity, format_quantity, quantities
+from roughvisc.units import Quantity, format_quantity, listed, number, quantities
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ _ONE_TEMPERATURE, _SAME_FREQUENCY = 2.0, 1e-6
 _DECADE = 10.0 * (1 + 1e-9)
 
 
-@quantities(times="s", compliances="1/Pa", noise="1 >= 0")
+@quantities(times="s ...", compliances="1/Pa ...", noise="1 >= 0")
 def creep_table(
     times: Sequence[Quantity],
     compliances: Sequence[Quantity],
@@ -110,7 +110,7 @@ def creep_table(
     return Prony(glassy, float(weights[0] / rows[-1]), tuple(weights[1:]), tuple(tau), poisson, **about)
 
 
-@quantities(times="s", moduli="Pa")
+@quantities(times="s ...", moduli="Pa ...")
 def relaxation_table(
     times: Sequence[Quantity], moduli: Sequence[Quantity], kind: Kind = "shear", poisson: float = 0.5
 ) -> Prony:
@@ -157,7 +157,7 @@ def relaxation_table(
     return relaxation_series(float(weights[0]), weights[1:], theta, poisson, **about)
 
 
-@quantities(storage="Pa", loss="Pa")
+@quantities(frequencies="1 ...", storage="Pa ...", loss="Pa ...")
 def dynamic_table(
     frequencies: Sequence[float],
     storage: Sequence[Quantity],
@@ -203,7 +203,10 @@ def dynamic_table(
     it is smaller. A large misfit means that the two moduli do not belong to one passive material.
     """
     one_of("frequency_unit", frequency_unit, ("rad/s", "Hz"))
-    factors = shift_factors if np.ndim(shift_factors) else np.full(np.size(frequencies), shift_factors)
+    if isinstance(shift_factors, Sequence | np.ndarray):
+        factors = listed(shift_factors, "1", "shift_factors")
+    else:
+        factors = np.full(len(frequencies), number(shift_factors, "1", "shift_factors"))
     names = ("frequency", "storage modulus", "loss modulus", "shift factor")
     omega, elastic, viscous, factors = _checked_rows(names, frequencies, storage, loss, factors, ascending=False)
     omega = omega * factors * (2 * math.pi if frequency_unit == "Hz" else 1.0)

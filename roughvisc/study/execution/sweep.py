@@ -23,7 +23,7 @@ from roughvisc.errors import InputError, RoughviscError
 from roughvisc.labels import warnings_of
 from roughvisc.observables import OBSERVABLES
 from roughvisc.progress import Bars, clock
-from roughvisc.study.case import Case, read_cases
+from roughvisc.study.case import Case, cases_given
 from roughvisc.study.case_text import value_text
 from roughvisc.study.execution.cluster import (
     default_client,
@@ -102,10 +102,7 @@ def sweep(
         If no case could be finished. If some cases fail, they are recorded in the folder and logged as warnings. A case
         that needs more memory than its worker has is refused and not recorded, because it may fit elsewhere.
     """
-    if isinstance(cases, str | Path):
-        cases = read_cases(cases)
-    if not cases:
-        raise InputError("cases is empty: expected at least one case")
+    cases = cases_given(cases)
     folder = result_folder(cases[0], out).absolute()
     if client is None and workers is None:
         client = default_client()
@@ -351,7 +348,7 @@ def observe(
     InputError
         If a quantity cannot be computed from a result; its file is not changed.
     """
-    cases = read_cases(cases) if isinstance(cases, str | Path) else cases
+    cases = cases_given(cases)
     distinct = {case.key: case for case in cases if case.observed}
     folder = result_folder(cases[0], out).absolute()
     added = []

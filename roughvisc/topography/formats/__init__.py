@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
+from roughvisc.arguments import listed_names
 from roughvisc.errors import InputError
 from roughvisc.topography.formats import binary, text
 from roughvisc.topography.formats.scan_file import Channel, ScanFile
@@ -67,20 +68,20 @@ def open_file(path: Path, format: str | None) -> ScanFile:
     raise ValueError("; ".join(failures))
 
 
-def add_format(format: str, suffixes: Sequence[str], read: Callable[[Path], ScanFile]) -> None:
+def add_format(format: str, suffixes: Sequence[str] | str, read: Callable[[Path], ScanFile]) -> None:
     """Add a format to :func:`roughvisc.open_scan` in this process, or replace a format of the same name.
 
     Parameters
     ----------
     format : str
         Name, as ``format=`` takes it.
-    suffixes : sequence of str
+    suffixes : sequence of str, or str
         Suffixes of its files, without the dot. May be empty.
     read : callable
         ``read(path)`` returns a :class:`ScanFile`. Any exception is reported as an
         :class:`~roughvisc.errors.InputError` that names the file.
     """
-    _FORMATS[format] = tuple(suffix.lower().removeprefix(".") for suffix in suffixes), read
+    _FORMATS[format] = tuple(suffix.lower().removeprefix(".") for suffix in listed_names(suffixes)), read
 
 
 def supported_formats() -> dict[str, Sequence[str]]:
