@@ -46,6 +46,23 @@ def test_cycle_work__of_a_punch_settles_at_the_closed_form():
     assert abs(work[0] / exact - 1) > 1e-2, "a part of the work of the first cycle is stored"
 
 
+@pytest.mark.parametrize("part", [0.01, 0.05, 0.2])
+def test_cycle_work__of_taps_is_the_closed_form_within_its_error(part):
+    """A flat punch, three cycles of a part of its approach."""
+    punch, mean = rv.flat_punch(RADIUS, 2.6 * RADIUS, 7), 4e-6
+    press = rv.Program().approach(mean, over=0.1)
+    program = press.cycle(mean, part * mean, PERIOD, 3, control="approach")
+    settings = {"tolerance": 1e-3, "fields": (), "progress": False}
+    ds = rv.simulate(punch, RUBBER, program, **settings)
+    elastic = rv.simulate(punch, rv.elastic(1.0), press, **settings)
+    cells = float(elastic.force[-1]) / (8 * RADIUS * mean)  # force over that of a round punch, E* = 4 Pa
+    exact = cells * punch_dissipation(RADIUS, RUBBER, part * mean, PERIOD)
+    work = float(observables.cycle_work(ds)["cycle_work"][-1])
+    stated = float(np.ptp(ds.work_error.sel(time=slice(program.duration - PERIOD - 1e-9, None)).values))
+    assert work == pytest.approx(exact, abs=stated + 5e-3 * exact)
+    assert stated < 0.3 * exact
+
+
 def test_cycle_work__of_cycles_after_a_ramp_that_end_between_steps():
     program = rv.Program().load(2.0, over=0.1) + rv.Program.cycle(2.0, 1.0, PERIOD, 4.2)
     ds = ellipse(200, program, start=0.1).isel(time=slice(7, -9))
