@@ -255,7 +255,7 @@ def run(
     progress: bool | Progress = True,
     threads: int | None = None,
 ) -> xr.Dataset:
-    """Compute one case and store it in a file.
+    """Compute one case and store it in a file, with the quantities that ``[observe]`` of the study requests.
 
     It runs in this process. To run it on a worker of a cluster, use :func:`roughvisc.sweep` with a client.
 
@@ -286,7 +286,8 @@ def run(
     ------
     InputError
         If the input is invalid; nothing is written. If a wanted error cannot be reached: the message states the
-        smallest error that can be reached, and its sources.
+        smallest error that can be reached, and its sources. If a quantity in ``[observe]`` cannot be computed from the
+        result; the result is kept.
     TooLargeError
         If the case needs more memory than is available. It is refused before any memory is allocated, and no failure is
         recorded.
@@ -294,12 +295,13 @@ def run(
         If the contact of a step or at a speed is not solved; no result is written.
     """
     from roughvisc.study.case import case_given
-    from roughvisc.study.execution.run import result_folder, run_case
+    from roughvisc.study.execution.run import result_folder
+    from roughvisc.study.execution.sweep import run_one
     from roughvisc.study.storage.netcdf import open_result
 
     stated = case_given(case)
     if want is None:
-        return open_result(run_case(stated, result_folder(stated, out), progress=progress, threads=threads))
+        return open_result(run_one(stated, result_folder(stated, out), progress=progress, threads=threads))
     from roughvisc.study import target
 
     return target.run(stated, out, want=want, progress=progress is not False, threads=threads)

@@ -1,6 +1,6 @@
 """A rough seal that creeps until it closes: leak rate over five decades of time, and maps of the flow.
 
-Runs ``creeping_seal.toml``, computes the leak rate that it requests, and draws the flow of the water.
+Runs ``creeping_seal.toml``, which requests the leak rate, and draws the flow of the water.
 
     python workflows/creeping_seal.py [FIGURE]
 """
@@ -18,10 +18,7 @@ STUDY = Path(__file__).with_suffix(".toml")
 
 def main(figure="creeping_seal.png"):
     with tempfile.TemporaryDirectory() as folder:
-        rv.run(STUDY, folder, progress=False)
-        (path,) = rv.observe(STUDY, folder)
-        with rv.open_result(path) as ds:
-            ds = ds.load()
+        ds = rv.run(STUDY, folder, progress=False).load()
     flowing = ds.leak_rate > 0
     for time, rate, area in zip(ds.time[flowing], ds.leak_rate[flowing], ds.contact_fraction[flowing], strict=True):
         print(f"{float(time):8.3g} s   {1e9 * float(rate):9.3g} mm3/s   {100 * float(area):5.1f} % in contact")

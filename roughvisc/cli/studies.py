@@ -191,15 +191,14 @@ def _run_one(case: Case, folder: Path, console: Console, plots: bool, threads: i
     from roughvisc.plot.save import DEFAULT, save_figures
     from roughvisc.progress import reporting
     from roughvisc.study.execution.cluster import threads_each
-    from roughvisc.study.execution.run import is_result_of, run_case
+    from roughvisc.study.execution.run import is_result_of
+    from roughvisc.study.execution.sweep import run_one
     from roughvisc.study.storage.folder import case_path
 
     if is_result_of(case, case_path(folder, case.key, "result")):
         say(console, "Already finished: nothing to compute")
     with reporting(case.title, case.experiment.progress, console) as report:
-        path = run_case(case, folder, progress=report, threads=threads or threads_each(1))
-    with console.status("observing"):
-        rv.observe([case], folder)
+        path = run_one(case, folder, progress=report, threads=threads or threads_each(1))
     with rv.open_result(path) as dataset:
         console.print(result_table(dataset))
         say_path(console, "Result", path)
@@ -211,14 +210,12 @@ def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, 
     """Compute and summarise a sweep; raise its failure, if there is one."""
     from roughvisc.cli.tables import sweep_table
     from roughvisc.study.execution.run import REFUSED
-    from roughvisc.study.execution.sweep import Display, run_cases
+    from roughvisc.study.execution.sweep import Display, run_study
     from roughvisc.study.storage.folder import LOG
     from roughvisc.study.storage.sweep_data import CASES, numbers_of, sweep_cases
 
-    found = run_cases(cases, folder, client=client, display=Display(not console.quiet, console), **computing)
+    found = run_study(cases, folder, client=client, display=Display(not console.quiet, console), **computing)
     outcomes, numbers = list(found.values()), numbers_of(sweep_cases(cases))
-    with client.as_current() if client is not None else nullcontext(), console.status("observing"):
-        rv.observe(cases, folder)
     console.print(sweep_table(outcomes, len(cases), cases[0].title))
     for what, path in (("Results", folder), ("Table of cases", folder / CASES), ("Log", folder / LOG)):
         say_path(console, what, path)

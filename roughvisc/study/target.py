@@ -22,7 +22,8 @@ from roughvisc.errors import InputError
 from roughvisc.study import neighbours
 from roughvisc.study.case import Case, vary
 from roughvisc.study.execution.cluster import default_client
-from roughvisc.study.execution.run import is_result_of, result_folder, run_case
+from roughvisc.study.execution.run import is_result_of, result_folder
+from roughvisc.study.execution.sweep import run_one
 from roughvisc.study.neighbours import QUANTITIES, quantity_of
 from roughvisc.study.storage.folder import atomic_write, case_path
 from roughvisc.study.storage.netcdf import open_result, write_dataset
@@ -81,7 +82,7 @@ def run(
     chosen, reasons, budgets = choose(case, want, folder, log.info, **computing)
     for name, one in budgets.items():
         write_dataset(one, folder / neighbours.FOLDER / f"budget-{name}.nc")
-    result = open_result(run_case(chosen, folder, threads=threads))
+    result = open_result(run_one(chosen, folder, threads=threads))
     return result.assign_attrs(choice="\n".join(reasons))
 
 

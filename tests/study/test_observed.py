@@ -75,15 +75,18 @@ def test_sweep__has_it_in_table_results_and_figures(invoke, study, tmp_path, coa
     assert "sweep-leak_rate-time.png" in written
 
 
-def test_observe__from_python_after_a_sweep(study, tmp_path):
-    path = study(LEAKAGE + LOADS)
-    rv.sweep(path, tmp_path / "out", workers=0, progress=False)
+def test_run_and_sweep__compute_what_is_observed(study, tmp_path):
+    """As ``roughvisc run`` does; after a change of the viscosity `observe` changes the files alone."""
+    assert (rv.run(study(LEAKAGE), tmp_path / "one", progress=False).leak_rate[0] > 0).all()
+    swept = rv.sweep(study(LEAKAGE + LOADS), tmp_path / "out", workers=0, progress=False)
+    assert (swept.leak_rate[:, 0] > 0).all()
+    path = study(LEAKAGE.replace("1 mPa s", "4 mPa s") + LOADS)
     told = []
     added = rv.observe(path, tmp_path / "out", progress=lambda done, of: told.append((done, of)))
     assert sorted(one.stem for one in added) == sorted(case.key for case in read_cases(path))
     assert told == [(0, 2), (1, 2)]
     assert rv.observe(path, tmp_path / "out") == []
-    assert "leak_rate" in rv.open_results(tmp_path / "out")
+    np.testing.assert_allclose(4 * rv.open_results(tmp_path / "out").leak_rate, swept.leak_rate, rtol=1e-12, atol=0)
 
 
 def test_observe__refuses_absent_cells_and_leaves_the_result(invoke, study, tmp_path):

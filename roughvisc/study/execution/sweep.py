@@ -11,7 +11,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,7 @@ from roughvisc.errors import InputError, RoughviscError
 from roughvisc.labels import warnings_of
 from roughvisc.observables import OBSERVABLES
 from roughvisc.progress import Bars, clock
+from roughvisc.solve import Progress
 from roughvisc.study.case import Case, cases_given
 from roughvisc.study.case_text import value_text
 from roughvisc.study.execution.cluster import (
@@ -32,7 +33,7 @@ from roughvisc.study.execution.cluster import (
     require_same_version,
     threads_each,
 )
-from roughvisc.study.execution.run import FULL, REFUSED, Outcome, attempt, outcome_of, result_folder
+from roughvisc.study.execution.run import FULL, REFUSED, Outcome, attempt, outcome_of, result_folder, run_case
 from roughvisc.study.storage.folder import (
     case_path,
     clean_folder,
@@ -65,6 +66,7 @@ def sweep(
 ) -> xr.Dataset:
     """Compute many cases, store each in a file, and open the results together.
 
+    The files contain the quantities that ``[observe]`` of the study requests.
     Finished cases are not computed again, and identical cases are computed once. Repeat the call to resume; failed
     cases are tried again. In a script, call it below ``if __name__ == "__main__":``, because the workers of the default
     cluster are processes that import the script.
@@ -96,8 +98,8 @@ def sweep(
     Raises
     ------
     InputError
-        If the input is invalid (nothing runs), the call is at the top level of a script, or the results differ in times
-        or grid.
+        If the input is invalid (nothing runs), the call is at the top level of a script, some results lie over time
+        and others over speed, or a quantity in ``[observe]`` cannot be computed from a result (the results are kept).
     RoughviscError
         If no case could be finished. If some cases fail, they are recorded in the folder and logged as warnings. A case
         that needs more memory than its worker has is refused and not recorded, because it may fit elsewhere.
@@ -106,7 +108,7 @@ def sweep(
     folder = result_folder(cases[0], out).absolute()
     if client is None and workers is None:
         client = default_client()
-    outcomes = run_cases(
+    outcomes = run_study(
         cases,
         folder,
         client=client,
@@ -121,6 +123,37 @@ def sweep(
         kind = InputError if all(o.error in REFUSED for o in bad) else RoughviscError
         raise kind(f"none of {len(outcomes)} cases could be finished; the first: {bad[0].message}")
     return open_results(folder, cases=cases)
+
+
+def run_one(case: Case, folder: Path, *, progress: bool | Progress = False, threads: int | None = None) -> Path:
+    """Compute a case and the quantities that it requests in ``[observe]``, and return the file; see :func:`run_case`.
+
+    Raises
+    ------
+    InputError
+        If a quantity cannot be computed from the result, which is kept; and as :func:`run_case`.
+    """
+    path = run_case(case, folder, progress=progress, threads=threads)
+    observe([case], folder)
+    return path
+
+
+def run_study(
+    cases: Sequence[Case], folder: Path, *, display: Display, client: Client | None = None, **computing: Any
+) -> dict[str, Outcome]:
+    """Compute cases and the quantities that they request in ``[observe]``; see :func:`run_cases`.
+
+    Raises
+    ------
+    InputError
+        If a quantity cannot be computed from a result, which is kept; and as :func:`run_cases`.
+    """
+    outcomes = run_cases(cases, folder, display=display, client=client, **computing)
+    if any(case.observed for case in cases):
+        display.say("computes the quantities in [observe]")
+        with client.as_current() if client is not None else nullcontext():
+            observe(cases, folder)
+    return outcomes
 
 
 def run_cases(
@@ -325,8 +358,9 @@ def observe(
 ) -> list[Path]:
     """Compute the quantities in ``[observe]`` of a study from its finished results, and add them to the files.
 
-    ``roughvisc run`` calls this function at the end. After :func:`roughvisc.run` and :func:`roughvisc.sweep` call it
-    with the same arguments. Quantities that a file already contains, for equal arguments, are not computed again.
+    :func:`roughvisc.run`, :func:`roughvisc.sweep` and ``roughvisc run`` do so at the end. Call this function with the
+    same arguments after a change of ``[observe]``: no case is computed again. Quantities that a file already contains,
+    for equal arguments, are not computed again.
     Frames are Dask tasks, on the default client if there is one, otherwise in threads.
 
     Parameters
