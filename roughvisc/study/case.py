@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.arguments import a_table, split
+from roughvisc.arguments import a_table, path_of, split
 from roughvisc.errors import InputError, RoughviscError, short_repr
 from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
@@ -270,7 +270,7 @@ def read_cases(path: str | Path) -> list[Case]:
     InputError
         As :func:`read_study` does, for the first case that is wrong; or if a time is after the end of every program.
     """
-    path = Path(path)
+    path = path_of("path", path, "a study file")
     if not path.exists():
         raise InputError(f"{path}: does not exist: expected a study file (TOML)")
     data = read_toml(path, "valid TOML")

@@ -25,6 +25,7 @@ from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF
 from xarray.core import indexing
 
+from roughvisc.arguments import path_of
 from roughvisc.errors import InputError
 from roughvisc.labels import CARRIED, STEPS, label, steps_of
 from roughvisc.study.storage.folder import atomic_write, require_file, results_at, unusable
@@ -91,7 +92,7 @@ def open_result(path: str | Path) -> xr.Dataset:
     Every block of a variable has a checksum (fletcher32), which is verified when the block is read. This function reads
     only the histories. :func:`verify` reads all blocks.
     """
-    path = Path(path)
+    path = path_of("path", path, "a result")
     require_file(path)
     try:
         dataset = xr.open_dataset(path, engine=ResultBackend)
@@ -210,7 +211,7 @@ def verify(place: str | Path) -> dict[Path, str]:
     InputError
         If the path does not exist, or the folder contains no result.
     """
-    place, flaws = Path(place), {}
+    place, flaws = path_of("place", place, "a result, or of a folder of results"), {}
     if not place.exists():
         raise InputError(f"{place}: does not exist: expected a result, or a folder of results")
     for path in results_at(place):

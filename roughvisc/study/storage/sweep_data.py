@@ -22,6 +22,7 @@ import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
+from roughvisc.arguments import path_of
 from roughvisc.errors import InputError
 from roughvisc.labels import heading, label
 from roughvisc.observables.frames import expect_result
@@ -236,7 +237,7 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.
     >>> results = rv.open_results("results/load_sweep")  # doctest: +SKIP
     >>> results.set_index(case=["program_0_load", "surface_seed"]).unstack("case").contact_area  # doctest: +SKIP
     """
-    folder = Path(out).absolute()
+    folder = path_of("out", out, "a folder of results").absolute()
     index = index_of(folder)
     listed = read_sweep(folder) if cases is None else sweep_cases(cases)
     listed = listed or {key: entry.case for key, entry in index.items()}
@@ -370,13 +371,13 @@ def to_table(out: str | Path) -> pd.DataFrame:
     Raises
     ------
     InputError
-        If the folder contains no result.
+        If the folder contains no result, or `out` is not a path.
 
     Examples
     --------
     >>> rv.to_table("results/load_sweep").to_excel("load_sweep.xlsx")  # doctest: +SKIP
     """
-    folder = Path(out).absolute()
+    folder = path_of("out", out, "a folder of results; rv.to_csv takes a Dataset").absolute()
     index, cases = index_of(folder), read_sweep(folder)
     if not index and not cases:
         raise no_results(folder)

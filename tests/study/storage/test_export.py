@@ -9,7 +9,7 @@ import numpy as np
 import pint
 import pytest
 import sample_results as made
-from support import at_rows
+from support import at_rows, refused
 
 import roughvisc as rv
 from roughvisc.errors import InputError
@@ -69,6 +69,15 @@ def test_csv__gives_every_history_back(computed, tmp_path):
         else:
             found = [float(text) if text else np.nan for text in texts]
             np.testing.assert_array_equal(found, computed[name].values)
+
+
+@pytest.mark.parametrize(
+    ("read", "key"),
+    [(rv.to_table, "out"), (rv.open_results, "out"), (rv.open_result, "path"), (rv.read_cases, "path")],
+)
+def test_result__is_no_path_of_results(computed, read, key):
+    with refused(key, "Dataset"):
+        read(computed)
 
 
 def test_csv__is_refused_for_many_cases(computed, tmp_path):
