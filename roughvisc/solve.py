@@ -22,9 +22,11 @@ from roughvisc.experiment.base import Experiment, Outgrown, Row, Rows
 from roughvisc.experiment.grid_error import with_grid_error
 from roughvisc.experiment.loading import Loading
 from roughvisc.labels import CARRIED, TITLE, label
+from roughvisc.mechanics.grid import transform_library
 from roughvisc.settings import Problem
 from roughvisc.topography.grid import nominal_area
 from roughvisc.variables import OF_STEPS, STEP, STEPPED, VARIABLES
+from roughvisc.version import program_version
 
 log = logging.getLogger("roughvisc")
 Array = NDArray[Any]
@@ -226,9 +228,14 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
         variables[name] = (axis, "x", "y"), found
     if "filled" in height.coords:
         variables["filled"] = ("x", "y"), height["filled"].values
-    made = {"Conventions": "CF-1.11", "boundary": settings.boundary, "tolerance": settings.tolerance}
-    made["history"] = str(height.attrs.get("history", ""))
-    made |= experiment.facts(rows.problem.body, height)
+    made = {
+        "Conventions": "CF-1.11",
+        "source": f"{program_version()}; {transform_library()}",
+        "history": str(height.attrs.get("history", "")),
+        "program": experiment.described(),
+        "boundary": settings.boundary,
+        "tolerance": settings.tolerance,
+    } | experiment.facts(rows.problem.body, height)
     dataset, warnings = rows.finish(xr.Dataset(variables, coordinates, made))
 
     tables, lines = list[str](), list[str]()

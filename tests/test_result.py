@@ -49,13 +49,27 @@ def test_result__has_few_variables_and_attributes(stored, tmp_path):
     assert {"thickness", "warnings"} <= set(fullest.attrs)
     for ds in (stored, fullest, curve, scan):
         assert len(ds.variables) <= 26
-        assert len(ds.attrs) <= 14
+        assert len(ds.attrs) <= 17
         assert all(isinstance(value, str | int | float | np.number) for value in ds.attrs.values())
     assert stored.stated_error.attrs["long_name"] == "numerical error"
     every = {**shared, "boundary": "periodic", "times": 2, "fields": ("pressure", "gap", "displacement")}
     load, slide = (rv.simulate(rough, material, one, **every) for one in (press, press.slide(1e-4, over=0.1)))
     for ds in (load, slide):
         assert len(ds.variables) <= 26
+
+
+def test_attributes__state_program_body_material_and_version(ball, stored):
+    """They are the same for every way to compute a result; the text of a series makes the series again."""
+    wave = rv.wavy(1e-6, 1e-3, (1e-3, 1e-4), (24, 3), waves=1)
+    curve = rv.friction(wave, rv.sheet(RUBBER, 1e-3), pressure=5e4, speeds=[1e-3, 0.1], progress=False)
+    for ds, body in ((ball, "half-space"), (stored, "half-space"), (curve, repr(rv.sheet(RUBBER, 1e-3).kernel))):
+        assert ds.attrs["body"] == body
+        assert ds.attrs["source"].startswith("roughvisc ")
+    for ds in (ball, curve):
+        assert eval(ds.attrs["material"], {"Prony": rv.Prony}) == RUBBER
+    assert ball.attrs["program"] == "load to 10 mN over 500 ms, hold 2 s"
+    assert curve.attrs["program"] == "Steady sliding: 2 speeds from 1 mm/s to 100 mm/s along x, under 50 kPa"
+    assert stored.attrs["program"] == "load to 5 mN at once, hold 200 ms"
 
 
 def test_steps__hold_every_accepted_step_and_the_rows_among_them(ball, stored):

@@ -122,6 +122,10 @@ class Experiment(ABC):
     def facts(self, body: Body, height: xr.DataArray) -> dict[str, Any]:
         """Return the attributes of a result that an audit needs: facts about the body, and the time scale [s]."""
 
+    def described(self) -> str:
+        """Return the experiment in words, for the attribute ``program`` of a result."""
+        return repr(self)
+
     @abstractmethod
     def progress(self, done: float, end: float) -> str:
         """Return the progress in words."""

@@ -50,6 +50,8 @@ LARGEST = 1e100
 #: A segment, or the period of a cycle, lasts at least this many units in the last place of its end: adding a millionth
 #: of its length, the shortest time step, must change the time.
 LEAST_ROUNDINGS = 4e6
+#: Segments of a program that the attribute ``program`` of a result lists.
+DESCRIBED = 100
 
 
 @dataclass(frozen=True)
@@ -100,6 +102,10 @@ class Loading(Experiment):
 
     def __repr__(self) -> str:
         return repr(self.program)
+
+    def described(self) -> str:
+        """Return the segments of the program in words."""
+        return self.program.in_words(DESCRIBED)
 
     def rows(self, problem: Problem, state: LoadingState | None = None, *, in_memory: bool = True) -> LoadingRows:
         """Return all accepted steps, from rest or a state; the kept ones are rows of the result."""

@@ -84,7 +84,7 @@ class Kernel(ABC):
 
     def described(self) -> dict[str, Any]:
         """Return the attributes of a result that describe the body: names and values."""
-        return {"kernel": repr(self)}
+        return {"body": repr(self)}
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,13 @@ class HalfSpace(Kernel):
     .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, sections 3.2 and 13.2.
     """
 
+    #: Attribute ``body`` of a result.
+    text = "half-space"
     raises_surface = False
+
+    def described(self) -> dict[str, Any]:
+        """Return the attribute ``body``."""
+        return {"body": self.text}
 
     def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
         r"""Return the surface displacement of the half-space under one uniformly loaded cell.
@@ -320,7 +326,7 @@ class Body:
         end : float
             Time at which the creep ends. [s]
         """
-        facts = {} if self.kernel == HALF_SPACE else self.kernel.described()
+        facts = {"material": "; ".join(map(repr, self.materials))} | self.kernel.described()
         facts["compliance_at_end"] = float(self.material.contact_compliance(end))
         if not self.material.stands_for:
             facts["poisson"] = self.material.poisson

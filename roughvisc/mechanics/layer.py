@@ -450,7 +450,7 @@ class LayeredBody(Body):
 
     def facts(self, end: float) -> dict[str, Any]:
         """Return the compliances of the top layer [1/Pa], and the body in words."""
-        return super().facts(end) | {"kernel": repr(self)}
+        return super().facts(end) | {"body": repr(self)}
 
 
 @quantities(thickness="m")

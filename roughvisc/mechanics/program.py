@@ -194,15 +194,24 @@ class Program:
     note: str = field(default="", compare=False)
 
     def __repr__(self) -> str:
-        """Return the first segments in words, and the number of others."""
-        words = [str(segment) for segment in self.segments[:_LISTED]]
-        for place, (before, segment) in enumerate(pairwise(self.segments[:_LISTED]), 1):
+        return f"Program: {self.in_words(_LISTED)}"
+
+    def in_words(self, listed: int) -> str:
+        """Return the first segments in words, and the number of others.
+
+        Parameters
+        ----------
+        listed : int
+            Largest number of segments in words.
+        """
+        words = [str(segment) for segment in self.segments[:listed]]
+        for place, (before, segment) in enumerate(pairwise(self.segments[:listed]), 1):
             if segment.holds and segment.control == before.control:
                 words[place] = f"hold {format_quantity(segment.duration, 's')}"
-        more = len(self.segments) - _LISTED
+        more = len(self.segments) - listed
         if more > 0:
             words.append(f"and {more} more segments, {format_quantity(self.duration, 's')} in all")
-        return f"Program: {', '.join(words) or 'nothing'}"
+        return ", ".join(words) or "nothing"
 
     def _to(self, control: Control, value: Any, over: Any) -> Program:
         """Ramp linearly to a value of a controlled quantity."""

@@ -127,8 +127,8 @@ class Sheet(Kernel):
         return float(_correction(self.poisson, self.base)(np.zeros(1))[0]) / self.thickness
 
     def described(self) -> dict[str, Any]:
-        """Return thickness [m] and base."""
-        return {"thickness": self.thickness, "base": self.base}
+        """Return the sheet as text, its thickness [m] and its base."""
+        return {"body": repr(self), "thickness": self.thickness, "base": self.base}
 
     def transfer(self, qx: ArrayLike, qy: ArrayLike) -> Array:
         """Return ``(2 / |q|) S(|q| h)``; at ``q = 0`` the limit, zero if the sheet is incompressible. [m]"""

@@ -14,7 +14,7 @@ from scipy.special import erf
 from roughvisc.errors import InputError
 from roughvisc.experiment.sliding import SlidingGrid
 from roughvisc.labels import label
-from roughvisc.mechanics.body import Body
+from roughvisc.mechanics.body import HALF_SPACE, Body
 from roughvisc.mechanics.materials.creep import Material, check_material
 from roughvisc.mechanics.steady_sliding import Sliding
 from roughvisc.observables.frames import history, need
@@ -85,9 +85,10 @@ def area_by_theory(dataset: xr.Dataset, material: Material) -> xr.Dataset:
     need(dataset, "force", "height")
     steps, kept = history(dataset), dataset["time"].values
     if dataset.attrs.get("boundary") not in ("periodic", "mirror"):
-        raise InputError("the theories are for surfaces without borders: expected boundary = 'periodic' or 'mirror'")
-    for body in dataset.attrs.keys() & {"thickness", "kernel"}:
-        raise InputError(f"the theories are for a half-space: found a result with the {body} {dataset.attrs[body]}")
+        found = dataset.attrs.get("boundary")
+        raise InputError(key="boundary", found=found, expected="'periodic' or 'mirror', as the theories assume")
+    if (body := dataset.attrs.get("body", HALF_SPACE.text)) != HALF_SPACE.text:
+        raise InputError(key="body", found=body, expected=f"a result on a {HALF_SPACE.text}, as the theories assume")
     material = check_material(material)
     area, times, force = nominal_area(dataset), steps["time"].values, steps["force"].values
     # int C(t - s) dp(s) for a pressure that is linear between the steps

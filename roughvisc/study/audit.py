@@ -21,6 +21,7 @@ from scipy import fft, ndimage
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
 from roughvisc.experiment.accuracy import loaded_depth
+from roughvisc.mechanics.body import HALF_SPACE
 from roughvisc.mechanics.sheet import BASE, Base, Sheet, factors
 from roughvisc.observables.frames import expect_result, history
 from roughvisc.topography.borders import border_mismatch
@@ -288,8 +289,8 @@ def thickness(scene: Scene) -> Found:
     """Relative error of the approach of a half-space, at the same load."""
     if scene.facts.get("thickness", math.inf) < math.inf:
         return 0.0, f"Modelled: a sheet of {as_text(scene.facts['thickness'], 'm', 3)}, {scene.facts['base']}."
-    if "kernel" in scene.facts:
-        return 0.0, f"Modelled: {scene.facts['kernel']}."
+    if scene.facts.get("body", HALF_SPACE.text) != HALF_SPACE.text:
+        return 0.0, f"Modelled: {scene.facts['body']}."
     if not scene.facts.get("poisson", -1.0) >= 0:
         raise NotKnown("Two bodies, or a Poisson ratio that changes or is negative: a sheet cannot be compared.")
     [depth] = scene.need("thickness")

@@ -6,8 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from functools import cache, cached_property
-from importlib import metadata
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
@@ -31,26 +30,12 @@ from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.readers import sha256
 from roughvisc.topography.scans import is_card, measured_file, read_card, read_toml, surface_height
 from roughvisc.units import format_quantity
+from roughvisc.version import NUMERICS_REVISION
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["Case", "read_cases", "read_study", "vary"]
-
-#: Incremented whenever the numbers of an unchanged case change.
-NUMERICS_REVISION = 55
-
-
-@cache
-def program_version() -> str:
-    """Return name and version of this program, and the revision of its numbers.
-
-    Examples
-    --------
-    >>> program_version()  # doctest: +SKIP
-    'roughvisc 0.1.dev493+g9bdb14a83 (numerics 15)'
-    """
-    return f"roughvisc {metadata.version('roughvisc')} (numerics {NUMERICS_REVISION})"
 
 
 @dataclass(frozen=True)
@@ -157,8 +142,9 @@ class Case:
     def key(self) -> str:
         """Sixteen hexadecimal digits that identify everything that determines the numbers.
 
-        The key is a digest of the tables in SI, the checksums of the scans, and :data:`NUMERICS_REVISION`. The title,
-        the paths, and the tables ``[observe]`` and ``[audit]`` do not count.
+        The key is a digest of the tables in SI, the checksums of the scans, and
+        :data:`roughvisc.version.NUMERICS_REVISION`. The title, the paths, and the tables ``[observe]`` and ``[audit]``
+        do not count.
         """
         settings: dict[str, Any] = {"fields": sorted(self.settings.fields)}
         for one in fields(self.settings):

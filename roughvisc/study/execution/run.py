@@ -20,14 +20,14 @@ from typing import TYPE_CHECKING, Any, Literal
 from roughvisc.arguments import split
 from roughvisc.errors import InputError, RoughviscError
 from roughvisc.labels import warnings_of
-from roughvisc.mechanics.grid import transform_library
 from roughvisc.settings import Problem
 from roughvisc.solve import Progress, solve
-from roughvisc.study.case import Case, labels_of, program_version
+from roughvisc.study.case import Case, labels_of
 from roughvisc.study.storage.checkpoint import CheckpointWriter
 from roughvisc.study.storage.folder import case_path, existing_part, lock_case, require_writable, unusable
 from roughvisc.study.storage.netcdf import DamagedError, open_result, write_result
 from roughvisc.study.storage.sweep_data import Entry, read_entry
+from roughvisc.version import program_version
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -97,9 +97,9 @@ def compute(
     now, stated = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"), case.to_json()
     ran = f"{now} {program_version()}: run of {case.origin.name if case.origin else 'a case'}"
     provenance = {
-        "Conventions": "CF-1.11",
+        "Conventions": dataset.attrs.pop("Conventions"),
         "title": title,
-        "source": f"{program_version()}; {transform_library()}",
+        "source": dataset.attrs.pop("source"),
         "history": "\n".join(filter(None, [dataset.attrs.pop("history", ""), ran])),
         "case": stated,
         "case_key": case.key,

@@ -26,7 +26,7 @@ from roughvisc.arguments import path_of
 from roughvisc.errors import InputError
 from roughvisc.labels import heading, label
 from roughvisc.observables.frames import expect_result
-from roughvisc.study.case import Case, identifier, labels_of, parameters_of, program_version
+from roughvisc.study.case import Case, identifier, labels_of, parameters_of
 from roughvisc.study.storage.folder import (
     DAMAGED,
     KEY,
@@ -40,6 +40,7 @@ from roughvisc.study.storage.netcdf import lazy, open_result, read_variable
 from roughvisc.study.study_file import unit_of
 from roughvisc.study.sweep_table import DRAWN, REALISATION
 from roughvisc.variables import AXES, ERRORS, GRID_ERROR, IN_TABLE, LARGEST_IN_TABLE, ROW, ROWS, VARIABLES, axis_of
+from roughvisc.version import program_version
 
 log = logging.getLogger("roughvisc")
 
