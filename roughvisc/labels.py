@@ -2,11 +2,13 @@
 
 A result contains rows at its kept times. The history of every accepted step is a second Dataset, the group ``steps`` of
 the file. The first Dataset contains it in ``encoding``, which xarray keeps in selections and copies and does not write
-to files.
+to files; a sweep contains a function that reads the steps of a case. A function that needs the steps refuses a Dataset
+without them, because its rows are too few for the same numbers.
 """
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Iterable, Mapping
@@ -18,9 +20,12 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.variables import ERRORS, GRID_ERROR, ROW, VARIABLES, axis_of
+from roughvisc.variables import ERRORS, GRID_ERROR, ROW, ROWS, VARIABLES, axis_of
 
-#: Group of the steps in a result's file, and its title; and the key of the steps in the encoding of a result.
+#: Coordinate of a sweep with the attributes in which the files of its cases differ, as JSON.
+ATTRIBUTES = "attributes"
+#: Group of the steps in a result's file, and its title; and the key of the steps in the encoding of a result, or of the
+#: function from the key of a case to its steps in the encoding of a sweep.
 STEPS, TITLE, CARRIED = "steps", "histories of every accepted step", "roughvisc_steps"
 #: Prefix of a method -> module of its function, which lies in a higher layer and is imported at its first use.
 _ROOMS = {"": "roughvisc.observables", "plot_": "roughvisc.plot"}
@@ -113,13 +118,55 @@ def expect_declared_units(dataset: xr.Dataset) -> None:
             raise InputError(f"the result has {name!r} in {found!r}: expected {declared!r}, as it was stored")
 
 
+def of_one_case(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a case that was selected from a sweep as its file contains it: all attributes, and only its own rows.
+
+    Any other Dataset is returned unchanged.
+
+    Examples
+    --------
+    >>> case = xr.Dataset({"force": ("time", [1.0])}, {"time": [0.0], "attributes": '{"boundary": "free"}'})
+    >>> of_one_case(case).attrs
+    {'boundary': 'free'}
+    """
+    if ATTRIBUTES in dataset.coords and not dataset[ATTRIBUTES].ndim and dataset[ATTRIBUTES].item():
+        stated = json.loads(dataset[ATTRIBUTES].item())
+        of_height = stated.pop("height", {})
+        dataset = dataset.drop_vars(ATTRIBUTES).assign_attrs(stated)
+        if "height" in dataset:
+            dataset["height"] = dataset["height"].assign_attrs(of_height)
+    axis = axis_of(dataset.variables)
+    if axis in dataset.coords and dataset[axis].dims == (ROW,):
+        known = np.flatnonzero(dataset[axis].notnull())
+        dataset = dataset.isel({ROW: known}).swap_dims({ROW: axis}).drop_vars(ROWS, errors="ignore")
+    return dataset
+
+
+def boundary_of(dataset: xr.Dataset) -> str:
+    """Return the boundary of a result or of a sweep; ``free`` if the attribute is absent.
+
+    Raises
+    ------
+    InputError
+        If the cases of a sweep have different boundaries.
+    """
+    stated = of_one_case(dataset)
+    if ATTRIBUTES in stated.coords and "boundary" not in stated.attrs:
+        raise InputError(key="boundary", found="several boundaries", expected="one case, as in ds.isel(case=0)")
+    return str(stated.attrs.get("boundary", "free"))
+
+
 def steps_of(result: xr.Dataset) -> xr.Dataset | None:
     """Return the history of the accepted steps that a result carries; None if it carries none, or another result's.
 
     When xarray combines several Datasets, it keeps the encoding of the first. Therefore the rows are compared with the
     steps.
     """
+    result = of_one_case(result)
     steps, named = result.encoding.get(CARRIED), {"time", "force"} <= result.variables.keys()
+    if callable(steps):
+        key = str(result.attrs.get("case_key", ""))
+        steps = steps(key) if key else None
     if steps is None or not named or result["force"].dims not in ((), ("time",)):
         return None
     rows = set(zip(np.ravel(result["time"]).tolist(), np.ravel(result["force"]).tolist(), strict=True))
@@ -151,8 +198,9 @@ def require_steps(result: xr.Dataset) -> xr.Dataset:
     if steps is None:
         raise InputError(
             key=STEPS,
-            found=f"a Dataset over {', '.join(map(str, result.dims)) or 'nothing'}",
-            expected="a result over time from rv.simulate, rv.run or rv.open_result, or a selection of its rows",
+            found=f"a Dataset over {', '.join(map(str, result.dims)) or 'nothing'} without the history of its steps",
+            expected="a result from rv.simulate, rv.run or rv.open_result, one case of rv.sweep, or a selection of its "
+            "rows (xarray loses the steps when it computes or combines values, and in to_netcdf)",
         )
     return steps
 

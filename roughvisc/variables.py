@@ -92,6 +92,9 @@ VARIABLES: dict[str, Variable] = {
     "x": Variable(("x",), "m", "x", "of the cell centre"),
     "y": Variable(("y",), "m", "y", "of the cell centre"),
     "case_key": Variable((), "", "key of the case", "name of its file", dtype="str"),
+    "attributes": Variable(
+        (), "", "attributes of the file", "of a case of a sweep: those that differ, JSON", dtype="str"
+    ),
     # surface
     "height": Variable(_GRID, "m", "height", "of the rigid profile, peaks up; attribute `highest`: its apex [m]"),
     "filled": Variable(_GRID, "", "filled points", dtype="int8", meanings=("measured", "filled")),

@@ -1,5 +1,7 @@
 """A result as a user has it: one flat Dataset, the history of its steps, and what xarray does to both."""
 
+from functools import partial
+
 import netCDF4
 import numpy as np
 import pytest
@@ -128,6 +130,53 @@ def test_file__has_the_group_of_steps_which_netcdf_of_xarray_loses(stored, tmp_p
     with refused("steps", None):
         _ = found.roughvisc.steps
     assert found.roughvisc.plot_history()
+
+
+#: Operations of xarray that change no number and lose the steps.
+LOSSES = {
+    "where": lambda ds, path: ds.where(ds.time >= 0),
+    "merge": lambda ds, path: xr.merge([ds], compat="equals", join="exact"),
+    "map": lambda ds, path: ds.map(lambda one: one, keep_attrs=True),
+    "drop_encoding": lambda ds, path: ds.drop_encoding(),
+    "dict": lambda ds, path: xr.Dataset.from_dict(ds.to_dict()),
+    "file": lambda ds, path: [ds.to_netcdf(path), xr.load_dataset(path)][1],
+}
+
+
+@pytest.fixture(scope="module")
+def cycles():
+    """Two cycles and a slide, with rows that are no ends of the cycles."""
+    rough = rv.self_affine(1e-3, (16, 14), hurst=0.8, rms_slope=0.1, rolloff=5e-4, seed=1)
+    program = rv.Program().pressure(2e4, over=0.1) + rv.Program.cycle(2e4, 1e4, 0.5, 2, control="pressure")
+    how = {"boundary": "periodic", "tolerance": 0.1, "progress": False}
+    return rv.simulate(rough, RUBBER, program.slide(2e-4, over=0.1), times=[0.3, 0.9, 1.2], **how)
+
+
+@pytest.mark.parametrize("lose", LOSSES.values(), ids=LOSSES)
+def test_result_without_steps__gives_no_other_numbers(cycles, lose, tmp_path):
+    """What needs the steps is refused or not known, and figures have no line between the rows."""
+    lost = lose(cycles, tmp_path / "lost.nc")
+    theory = partial(rv.observables.area_by_theory, material=RUBBER)
+    for function in (rv.observables.history, rv.observables.cycle_work, theory):
+        assert function(cycles)
+        with pytest.raises(rv.InputError, check=lambda error: error.key in ("steps", "height")):
+            function(lost)
+    for draw in (partial(rv.plot.history, quantities=["force", "work"]), rv.plot.area_against_load):
+        for ds, styles in ((cycles, {"-", "None"}), (lost, {"None"})):
+            assert {line.get_linestyle() for ax in draw(ds).axes for line in ax.lines} <= styles
+    assert rv.audit(cycles, density=1e3)["inertia"].verdict == "holds"
+    if lost.height.dims == ("x", "y"):
+        assert rv.audit(lost, density=1e3)["inertia"].verdict == "not known"
+    else:
+        with refused("height", ("x", "y", "time")):  # xarray repeats it at each row
+            rv.audit(lost, density=1e3)
+
+
+def test_cycle_work__of_rows_at_the_ends_of_the_cycles_needs_no_steps(cycles):
+    program = rv.Program().load(0.01, over=0.1) + rv.Program.cycle(0.01, 0.005, 0.5, 2)
+    ds = rv.simulate(BALL, RUBBER, program, times=[0.1, 0.6, 1.1], tolerance=0.1, fields=(), progress=False)
+    work = rv.observables.cycle_work
+    xr.testing.assert_equal(work(ds.drop_encoding()), work(ds))
 
 
 def test_warnings__are_one_attribute_of_one_line_each():

@@ -11,7 +11,7 @@ import xarray as xr
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
-from roughvisc.labels import label
+from roughvisc.labels import boundary_of, label
 from roughvisc.mechanics.transport import flow as flow_through
 from roughvisc.mechanics.transport import frozen_contact, label_clusters
 from roughvisc.observables.frames import by_frame, frame_by_frame, need
@@ -67,7 +67,7 @@ def clusters(dataset: xr.Dataset) -> xr.Dataset:
     InputError
         If the result contains neither ``pressure`` nor ``gap``, or the cells of its grid are not equal.
     """
-    periodic = dataset.attrs.get("boundary") == "periodic"
+    periodic = boundary_of(dataset) == "periodic"
 
     def measure(frame: np.ndarray) -> tuple[float, float, float]:
         sizes = np.bincount(label_clusters(frame, (periodic, periodic)).ravel())[1:]
@@ -186,7 +186,7 @@ def leakage(
     """
     one_of("along", along, ("x", "y"))
     need(dataset, "gap")
-    wrap = dataset.attrs.get("boundary") == "periodic"
+    wrap = boundary_of(dataset) == "periodic"
     gap, cells = dataset["gap"], dict(zip("xy", spacing(dataset, "leakage"), strict=True))
     across = "y" if along == "x" else "x"
     sides_of_cell = cells[along], cells[across]
@@ -264,7 +264,7 @@ def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str]) -> xr.D
         raise InputError(key="resistivity", found=resistivity, expected="none below zero, and not both zero")
     touching = contact(dataset)
     present = dataset["height"].notnull() if "height" in dataset else xr.ones_like(touching)
-    cells, boundary = spacing(dataset, "spots"), dataset.attrs.get("boundary", "free")
+    cells, boundary = spacing(dataset, "spots"), boundary_of(dataset)
 
     def measure(touching: np.ndarray, present: np.ndarray) -> tuple[float, float]:
         return frozen_contact(touching, cells, boundary, present=present)

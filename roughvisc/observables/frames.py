@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.labels import expect_declared_units, label, steps_of
-from roughvisc.variables import OTHER_DIMS, STEPPED, axis_of
+from roughvisc.labels import expect_declared_units, label, of_one_case, require_steps
+from roughvisc.variables import OTHER_DIMS, VARIABLES, axis_of
 
 #: Times closer than this part of a period count as equal.
 _SAME = 1e-9
@@ -26,16 +26,28 @@ def need(dataset: xr.Dataset, *names: str) -> None:
     expect_declared_units(dataset)
 
 
-def expect_result(dataset: Any, *names: str) -> None:
-    """Refuse a Dataset that is not the result of one case, has no rows, or lacks variables."""
+def expect_result(dataset: Any, *names: str) -> xr.Dataset:
+    """Return the result of one case, see :func:`roughvisc.labels.of_one_case`.
+
+    Raises
+    ------
+    InputError
+        If the Dataset is not the result of one case, has no rows, or lacks variables, or one has another dimension.
+    """
     axis = axis_of(getattr(dataset, "variables", ()))
     if not isinstance(dataset, xr.Dataset):
         raise InputError(f"expected a result (xarray.Dataset), found {type(dataset).__name__}")
+    dataset = of_one_case(dataset)
     if extra := [str(dim) for dim in dataset.dims if dim not in (axis, *OTHER_DIMS)]:
         raise InputError(f"the result has dimension {extra[0]!r}: choose one case, as in ds.isel({extra[0]}=0)")
     need(dataset, axis, *names)
     if dataset[axis].size == 0:
         raise InputError(f"the result has no {axis}: expected at least one row")
+    for name in names:
+        if name in VARIABLES and set(dataset[name].dims) - {*VARIABLES[name].over(axis)}:  # by xarray's where, for one
+            found, expected = dataset[name].dims, f"dimensions {', '.join(VARIABLES[name].over(axis))}, as stored"
+            raise InputError(key=name, found=found, expected=expected)
+    return dataset
 
 
 def by_frame(field: xr.DataArray) -> xr.DataArray:
@@ -93,22 +105,17 @@ def history(dataset: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Force, approach, area, mean gap and work over ``time`` at every accepted step. If the Dataset carries no steps,
-        its rows are returned.
+        Force, approach, area, mean gap and work over ``time`` at every accepted step.
 
     Raises
     ------
     InputError
-        If the Dataset contains several cases.
+        If the Dataset contains several cases, or has lost the history of its steps.
     """
-    need(dataset, "time")
-    if "time" not in dataset.dims or "case" in dataset.dims:
+    expect_declared_units(dataset)
+    if "case" in dataset.dims:
         raise InputError(f"the Dataset has dimensions {', '.join(map(str, dataset.sizes))}: choose one case first")
-    steps = steps_of(dataset)
-    if steps is not None:
-        return steps.swap_dims(step="time").drop_attrs(deep=False)
-    rows = dataset[[name for name in STEPPED if name in dataset]].drop_attrs(deep=False)
-    return rows.drop_vars([name for name, one in rows.coords.items() if not one.dims])
+    return require_steps(dataset).swap_dims(step="time").drop_attrs(deep=False)
 
 
 def cycle_work(dataset: xr.Dataset) -> xr.Dataset:
@@ -125,33 +132,33 @@ def cycle_work(dataset: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``cycle_start`` [s] and ``cycle_work`` [J] over ``cycle``, the numbers of the cycles from 1. Cycles that the
-        result does not cover are left out.
+        ``cycle_start`` [s] and ``cycle_work`` [J] over ``cycle``, the numbers of the whole cycles from 1.
 
     Raises
     ------
     InputError
-        If the program has no whole cycle.
+        If the program has no whole cycle, or the Dataset has lost the history of its steps and a cycle begins or ends
+        between its rows.
 
     Notes
     -----
     The work of a cycle is the change of the variable ``work`` in the cycle, over all accepted steps. Between steps
     ``work`` is interpolated linearly.
     """
-    steps = history(dataset)
-    need(steps, "work")
-    times = steps["time"].values
+    dataset = expect_result(dataset, "time", "work")
     segments = json.loads(dataset.attrs.get("cycles", "[]"))
     cycles = [(start + number * period, period) for start, period, count in segments for number in range(count)]
     if not cycles:
         expected = "one case's result, under a program with a whole cycle: see Program.cycle"
         raise InputError(key="cycles", found=segments, expected=expected)
     begin, period = np.transpose(cycles)
-    covered = (times[0] <= begin + _SAME * period) & (begin + period <= times[-1] + _SAME * period)
-    begin, end = begin[covered], (begin + period)[covered]
-    work = np.interp(end, times, steps["work"]) - np.interp(begin, times, steps["work"])
+    ends = np.concatenate([begin, begin + period])
+    rows = dataset["time"].values
+    is_row = np.abs(ends[:, None] - rows).min(axis=1) <= _SAME * np.tile(period, 2)
+    steps = dataset if is_row.all() else require_steps(dataset)  # the work at a row includes all steps before it
+    work = np.interp(ends, steps["time"], steps["work"])
     found = xr.Dataset(
-        {"cycle_start": ("cycle", begin), "cycle_work": ("cycle", work)},
-        coords={"cycle": np.flatnonzero(covered) + 1},
+        {"cycle_start": ("cycle", begin), "cycle_work": ("cycle", work[begin.size :] - work[: begin.size])},
+        coords={"cycle": np.arange(begin.size) + 1},
     )
     return label(found)

@@ -17,7 +17,7 @@ from roughvisc.labels import label
 from roughvisc.mechanics.body import HALF_SPACE, Body
 from roughvisc.mechanics.materials.creep import Material, check_material
 from roughvisc.mechanics.steady_sliding import Sliding
-from roughvisc.observables.frames import history, need
+from roughvisc.observables.frames import expect_result, history
 from roughvisc.topography.grid import nominal_area, rms_slope, spacing
 from roughvisc.topography.spectrum import wavevectors
 
@@ -66,7 +66,8 @@ def area_by_theory(dataset: xr.Dataset, material: Material) -> xr.Dataset:
     Raises
     ------
     InputError
-        If the boundaries are not periodic, the body is not a half-space, or the result contains several cases.
+        If the boundaries are not periodic, the body is not a half-space, the result contains several cases, or it has
+        lost the history of its steps, on which the theory depends.
 
     Notes
     -----
@@ -82,14 +83,14 @@ def area_by_theory(dataset: xr.Dataset, material: Material) -> xr.Dataset:
     .. [1] B. N. J. Persson, *J. Chem. Phys.* 115 (2001) 3840-3861.
     .. [2] A. W. Bush, R. D. Gibson, T. R. Thomas, *Wear* 35 (1975) 87-111.
     """
-    need(dataset, "force", "height")
-    steps, kept = history(dataset), dataset["time"].values
+    dataset = expect_result(dataset, "force", "height")
     if dataset.attrs.get("boundary") not in ("periodic", "mirror"):
         found = dataset.attrs.get("boundary")
         raise InputError(key="boundary", found=found, expected="'periodic' or 'mirror', as the theories assume")
     if (body := dataset.attrs.get("body", HALF_SPACE.text)) != HALF_SPACE.text:
         raise InputError(key="body", found=body, expected=f"a result on a {HALF_SPACE.text}, as the theories assume")
     material = check_material(material)
+    steps, kept = history(dataset), dataset["time"].values
     area, times, force = nominal_area(dataset), steps["time"].values, steps["force"].values
     # int C(t - s) dp(s) for a pressure that is linear between the steps
     since = np.maximum(kept[:, None] - times[None], 0.0)
@@ -131,6 +132,7 @@ def persson(dataset: xr.Dataset, material: Material | Body) -> xr.Dataset:
     ----------
     .. [1] B. N. J. Persson, *J. Chem. Phys.* 115 (2001) 3840.
     """
+    dataset = expect_result(dataset)
     if not {"height", "nominal_pressure", "speed"} <= set(dataset.variables) or "direction" not in dataset.attrs:
         raise InputError(key="dataset", found=list(dataset.variables), expected="a result of rv.friction with height")
     body = material if isinstance(material, Body) else Body(material)

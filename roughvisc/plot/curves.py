@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from roughvisc.arguments import listed_names, one_of
 from roughvisc.errors import InputError
-from roughvisc.observables import history as steps_of
+from roughvisc.labels import steps_of
 from roughvisc.observables.frames import expect_result
 from roughvisc.observables.theory import asperity_fraction, persson_fraction
 from roughvisc.plot import style
@@ -37,8 +37,9 @@ _DOTS = 40
 def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, *, over: str | None = None) -> Figure:
     """Draw quantities over time, over the distance slid, over the speed, or over each other.
 
-    Lines pass through every time step in the result, dots mark the kept times, and bands show the error of the grid, if
-    it is in the result. The axis is logarithmic if the largest value exceeds thirty times the smallest.
+    Lines pass through every time step, dots mark the kept times, and bands show the error of the grid, if it is in the
+    result. A result that has lost the history of its steps has dots alone. The axis is logarithmic if the largest value
+    exceeds thirty times the smallest.
 
     Parameters
     ----------
@@ -61,7 +62,7 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
     InputError
         If the Dataset is not one case's result, or lacks a quantity.
     """
-    expect_result(dataset)
+    dataset = expect_result(dataset)
     axis = axis_of(dataset.variables)
     over = over or axis
     default = ("friction_coefficient", "contact_area") if over == "sliding_distance" else _QUANTITIES
@@ -72,15 +73,16 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
     steps = steps_of(kept) if axis == "time" else kept
     columns, height = 1 if len(names) <= 3 else 2, 1.1 if len(names) > 2 else 1.7
     figure, axes = style.new_panels(len(names), columns, (4.1 - 0.6 * columns, height), shared="x")
-    across = style.row_axis(axes, (steps if over in steps else kept)[over])
+    across = style.row_axis(axes, (kept if steps is None or over not in steps else steps)[over])
     for ax, name in zip(axes, names, strict=True):
-        _draw_history(ax, name, steps if name in steps and over in steps else kept, kept, over, across)
+        line = kept if steps is not None and not {name, over} <= steps.variables.keys() else steps
+        _draw_history(ax, name, line, kept, over, across)
     figure.align_ylabels()
     style.legend_above(figure, style.named_in(*axes))
     return figure
 
 
-def _draw_history(ax: Axes, name: str, steps: xr.Dataset, kept: xr.Dataset, over: str, across: Unit) -> None:
+def _draw_history(ax: Axes, name: str, steps: xr.Dataset | None, kept: xr.Dataset, over: str, across: Unit) -> None:
     """Draw a quantity as a line through the steps and dots at the kept rows, with the theory and the error of the grid.
 
     Parameters
@@ -89,17 +91,22 @@ def _draw_history(ax: Axes, name: str, steps: xr.Dataset, kept: xr.Dataset, over
         Panel to draw in.
     name, over : str
         Quantities on the vertical and on the horizontal axis.
-    steps, kept : xarray.Dataset
-        Both quantities at the steps and at the kept rows.
+    steps : xarray.Dataset or None
+        Both quantities at the steps; None if these are not known.
+    kept : xarray.Dataset
+        Both quantities at the kept rows.
     across : Unit
         Unit of the horizontal axis.
     """
-    line, values, at = style.drawable(steps[name]), style.drawable(kept[name]), across(kept[over])
+    values, at = style.drawable(kept[name]), across(kept[over])
     (label, si), colour = style.described(kept[name]), style.CONTACT if "contact" in name else style.BLUE
+    line = values if steps is None else style.drawable(steps[name])
     unit, is_finer = unit_for(line, si), line.size > values.size
-    ax.plot(across(steps[over]), unit(line), color=colour, label="time steps" if is_finer else None)
-    if values.size <= _DOTS:
-        ax.plot(at, unit(values), "o", color=colour, label="kept times" if is_finer else None)
+    if steps is not None:
+        ax.plot(across(steps[over]), unit(line), color=colour, label="time steps" if is_finer else None)
+    if values.size <= _DOTS or steps is None:
+        label_of_dots = "kept times" if is_finer or steps is None else None
+        ax.plot(at, unit(values), "o", color=colour, label=label_of_dots)
     error = _GRID_ERROR.get(name, "")
     if name != "force" and error in kept and kept[error].notnull().any():
         ends = (unit(values * (1 + sign * kept[error])) for sign in (-1, 1))
@@ -114,6 +121,8 @@ def _draw_history(ax: Axes, name: str, steps: xr.Dataset, kept: xr.Dataset, over
 @quantities(contact_modulus="Pa")
 def area_against_load(results: xr.Dataset | Mapping[str, xr.Dataset], *, contact_modulus: Any = None) -> Figure:
     r"""Draw the contact area, corrected for the grid, against the force at every time step, one line per result.
+
+    A result that has lost the history of its steps has dots at its kept times, without a line.
 
     Parameters
     ----------
@@ -142,18 +151,19 @@ def area_against_load(results: xr.Dataset | Mapping[str, xr.Dataset], *, contact
         results = {"computed": results}
     if not isinstance(results, Mapping) or not results:
         raise InputError(key="results", found=type(results).__name__, expected="a result, or a mapping of results")
-    for dataset in results.values():
-        expect_result(dataset, "time", "force", "contact_area")
-    lines = {str(label): steps_of(dataset) for label, dataset in results.items()}
+    cases = {str(label): expect_result(dataset, "time", "force", "contact_area") for label, dataset in results.items()}
+    steps = {label: steps_of(case) for label, case in cases.items()}
+    lines = {label: case if steps[label] is None else steps[label] for label, case in cases.items()}
     loads, areas = (np.concatenate([one[name] for one in lines.values()]) for name in ("force", "contact_area"))
     across, up = unit_for(loads, "N"), unit_for(areas, "m^2")
     figure, (ax,) = style.new_panels(1, 1, (3.4, 2.6), lines=0)
     for label, one in lines.items():
-        marker = "o" if one["force"].size <= _DOTS else ""
-        ax.plot(across(one["force"]), up(one["contact_area"]), marker=marker, label=style.verbatim(label))
+        look = {"marker": "o" if steps[label] is None or one["force"].size <= _DOTS else ""}
+        look["ls"] = "" if steps[label] is None else "-"
+        ax.plot(across(one["force"]), up(one["contact_area"]), label=style.verbatim(label), **look)
     if contact_modulus is not None and loads.max() > 0:
         named = contact_modulus if isinstance(contact_modulus, Mapping) else {"": contact_modulus}
-        first = next(iter(results.values()))
+        first = next(iter(cases.values()))
         expect_result(first, "height")
         slope = rms_slope(first["height"], periodic=first.attrs.get("boundary") == "periodic")
         nominal, forces = nominal_area(first), np.geomspace(1e-3 * loads.max(), loads.max(), 50)

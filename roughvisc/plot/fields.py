@@ -221,7 +221,7 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
     InputError
         If the result holds none of the fields, or more than 8 times are requested.
     """
-    expect_result(dataset, "x", "y")
+    dataset = expect_result(dataset, "x", "y")
     fields = listed_names(fields)
     if not fields:
         raise InputError(key="fields", found=fields, expected=f"some of {', '.join(FIELDS)}, flux")
@@ -279,7 +279,7 @@ def section(dataset: xr.Dataset, time: Any = None, axis: str = "x", at: Quantity
     -------
     matplotlib.figure.Figure
     """
-    expect_result(dataset, "x", "y", "height", "pressure", "gap")
+    dataset = expect_result(dataset, "x", "y", "height", "pressure", "gap")
     one_of("axis", axis, ("x", "y"))
     rows, across = axis_of(dataset.variables), "y" if axis == "x" else "x"
     frame = largest_row(dataset) if time is None else frames_at(dataset, time, "time")[0]
@@ -337,7 +337,7 @@ def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, rate: Q
     path = Path(path)
     name = field or ("pressure" if "pressure" in dataset else "gap")
     one_of("field", name, FIELDS)
-    expect_result(dataset, "x", "y", name)
+    dataset = expect_result(dataset, "x", "y", name)
     writer = {".gif": PillowWriter, ".webp": PillowWriter, ".mp4": FFMpegWriter}.get(path.suffix.lower())
     if writer is None or not writer.isAvailable():
         raise InputError(f"{path.name}: expected a name that ends in .gif, .webp or, if ffmpeg is installed, .mp4")

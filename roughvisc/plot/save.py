@@ -98,7 +98,7 @@ def save_figures(dataset: xr.Dataset, folder: Any, stem: str, names: Collection[
     InputError
         If the Dataset is not one case's result or allows no figure.
     """
-    expect_result(dataset)
+    dataset = expect_result(dataset)
     figures = figures_of(dataset, names)
     written = [write_figure(figure, Path(folder, f"{stem}-{name}.png")) for name, _, figure in figures]
     if not written:

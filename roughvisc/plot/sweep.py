@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
+from roughvisc.labels import ATTRIBUTES
 from roughvisc.plot import style
 from roughvisc.plot.fields import rows_at
 from roughvisc.study.case_text import names_of, value_text
@@ -32,7 +33,8 @@ def swept_keys(results: xr.Dataset) -> dict[str, pd.Series]:
     numbers come first. Of keys that vary together only the first one is kept.
     """
     names = [str(name) for name, one in results.coords.items() if one.dims == ("case",)]
-    cases = pd.DataFrame({name: results[name].values for name in names if name not in ("case", "case_key", ROWS)})
+    others = ("case", "case_key", ATTRIBUTES, ROWS)
+    cases = pd.DataFrame({name: results[name].values for name in names if name not in others})
     first: dict[tuple[int, ...], str] = {}
     for name in cases:
         first.setdefault(tuple(pd.factorize(cases[name], use_na_sentinel=False)[0]), name)

@@ -111,7 +111,7 @@ def _case(job: tuple[Path | xr.Dataset, int, bool]) -> dict[str, Any]:
     """Return one case of the page: its row in the table and, if shown, figures, assumptions, surface and study."""
     source, number, is_shown = job
     with open_result(source) if isinstance(source, Path) else nullcontext(source) as dataset:
-        expect_result(dataset, "x", "y")
+        dataset = expect_result(dataset, "x", "y")
         case = json.loads(dataset.attrs.get("case", "{}"))
         title = str(case.get("title") or dataset.attrs.get("title") or f"case {number}")
         found = {"title": title, "name": case_words(case) or title, "key": str(dataset.attrs.get("case_key", ""))}

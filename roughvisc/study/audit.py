@@ -204,10 +204,13 @@ class Scene:
             return float(self.dataset["speed"].max()), float(power.max()), self.dataset.isel(speed=power.argmax())
         if "sliding_distance" not in self.dataset:
             return 0.0, 0.0, self.fullest
-        steps = history(self.dataset)
+        try:
+            steps = history(self.dataset)
+        except InputError as error:
+            raise NotKnown(f"The speeds of the slides are not known: {error}.") from error
         lasting = np.diff(steps["time"]) > 0
         if not lasting.any():
-            raise NotKnown("The speed of the slides is not known: audit the result with all of its steps.")
+            raise NotKnown("The speed of the slides is not known.")
         speeds = np.diff(steps["sliding_distance"])[lasting] / np.diff(steps["time"])[lasting]
         power = steps["friction_force"].values[1:][lasting] * speeds
         return float(speeds.max()), float(np.max(power)), self.fullest
@@ -571,7 +574,8 @@ def audit(
         one_of("base", base, get_args(Base))
         if thickness is None:
             raise InputError(key="base", found=base, expected="a thickness too")
-    expect_result(result, "force", "approach", "contact_area", "contact_fraction")
+    result = expect_result(result, "force", "approach", "contact_area", "contact_fraction")
+    expect_result(result, *(name for name in ("height", "pressure") if name in result))
     case = None
     if "case" in result.attrs:
         from roughvisc.study.case import Case  # imports this module

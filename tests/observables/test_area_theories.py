@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-import xarray as xr
 from samples import RUBBER
 from scipy.special import erf
 from support import refused
@@ -18,18 +17,17 @@ SURFACE = rv.self_affine(SIDE, (24, 20), hurst=0.8, rms_slope=0.1, rolloff=SIDE 
 SLOPE = float(rv.parameters(SURFACE, periodic=True)["Sdq"])
 
 
-def loaded(times, pressures, **attrs):
-    """A result with a history of the nominal pressure, piecewise linear, and a jump at its start."""
-    return xr.Dataset(
-        {"force": ("time", SIDE**2 * np.asarray(pressures, dtype=float)), "height": SURFACE},
-        {"time": np.asarray(times, dtype=float)},
-        attrs={"boundary": "periodic", **attrs},
-    )
+def loaded(times, pressures, material=RUBBER):
+    """A result under a nominal pressure that is piecewise linear, with a jump at its start."""
+    program = rv.Program.table(times, pressures, control="pressure")
+    how = {"boundary": "periodic", "tolerance": 0.1, "fields": (), "progress": False}
+    return rv.simulate(SURFACE, material, program, times=times, **how)
 
 
 def test_elastic__both_limits_by_hand():
     pressures = np.array([0.0, 1e2, 1e4, 1e6])
-    found = area_by_theory(loaded(np.arange(4), pressures), material=rv.elastic(1e6, 0.3))
+    ds = loaded(np.arange(4), pressures, rv.elastic(1e6, 0.3))
+    found = area_by_theory(ds, material=rv.elastic(1e6, 0.3))
     strain = pressures / (2e6 / 0.7) / SLOPE
     np.testing.assert_allclose(found["persson_contact_area"], SIDE**2 * erf(math.sqrt(2) * strain), rtol=1e-9)
     np.testing.assert_allclose(found["asperity_contact_area"], SIDE**2 * math.sqrt(2 * math.pi) * strain, rtol=1e-9)
@@ -65,4 +63,4 @@ def test_where_theories_do_not_hold__says_so():
     sheet = str(rv.sheet(RUBBER, 1e-3).kernel)
     for key, found in (("boundary", "free"), ("body", sheet)):
         with refused(key, found):
-            area_by_theory(loaded([0.0, 1.0], [0.0, 1e4], **{key: found}), RUBBER)
+            area_by_theory(loaded([0.0, 1.0], [0.0, 1e4]).assign_attrs({key: found}), RUBBER)

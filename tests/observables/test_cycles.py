@@ -63,15 +63,18 @@ def test_cycle_work__of_taps_is_the_closed_form_within_its_error(part):
     assert stated < 0.3 * exact
 
 
-def test_cycle_work__of_cycles_after_a_ramp_that_end_between_steps():
-    program = rv.Program().load(2.0, over=0.1) + rv.Program.cycle(2.0, 1.0, PERIOD, 4.2)
-    ds = ellipse(200, program, start=0.1).isel(time=slice(7, -9))
-    shifted = ds.assign_coords(time=ds.time + 0.3 * PERIOD / 200)
-    for one in (ds, shifted):
-        found = observables.cycle_work(one)
-        assert found["cycle"].values.tolist() == [2, 3], "those that the result covers"
-        np.testing.assert_allclose(found["cycle_start"], [0.1 + PERIOD, 0.1 + 2 * PERIOD])
-        np.testing.assert_allclose(found["cycle_work"], np.pi, rtol=1e-3)
+def test_cycle_work__of_cycles_after_a_ramp_that_end_between_steps(tmp_path):
+    """By a file of xarray: some rows, and all steps as the group `steps`. The rows alone are too few."""
+    program = rv.Program().load(2.0, over=0.1) + rv.Program.cycle(2.0, 1.0, PERIOD, 3.8)
+    loop = ellipse(200, program, start=0.1)
+    steps, file = loop.assign_coords(time=loop.time - 0.3 * PERIOD / 200), tmp_path / "loop.nc"
+    steps.isel(time=[30, 400]).to_netcdf(file)
+    with refused("steps"):
+        observables.cycle_work(rv.open_result(file))
+    steps.reset_index("time").rename_dims(time="step").to_netcdf(file, mode="a", group="steps")
+    found = observables.cycle_work(rv.open_result(file))
+    np.testing.assert_allclose(found["cycle_start"], 0.1 + PERIOD * np.arange(3))
+    np.testing.assert_allclose(found["cycle_work"], np.pi, rtol=1e-3)
 
 
 def test_cycle_work__refuses_what_has_no_cycles():

@@ -24,13 +24,14 @@ from numpy.typing import NDArray
 
 from roughvisc.arguments import path_of
 from roughvisc.errors import InputError
-from roughvisc.labels import heading, label
+from roughvisc.labels import ATTRIBUTES, CARRIED, heading, label, steps_of
 from roughvisc.observables.frames import expect_result
 from roughvisc.study.case import Case, identifier, labels_of, parameters_of
 from roughvisc.study.storage.folder import (
     DAMAGED,
     KEY,
     atomic_write,
+    case_path,
     no_results,
     read_json,
     recorded_failure,
@@ -64,8 +65,8 @@ class Entry:
         Name of the file in the folder.
     stamp : list of int
         Size of the file [bytes] and time of its last change [ns].
-    attributes : dict
-        Attributes of the file that are text or numbers.
+    attributes, of_height : dict
+        Attributes of the file and of its heights that are text or numbers.
     fields : dict
         dtype of each variable over x and y.
     arrays : dict
@@ -75,6 +76,7 @@ class Entry:
     file: str
     stamp: list[int]
     attributes: dict[str, Any]
+    of_height: dict[str, Any]
     fields: dict[str, str]
     arrays: dict[str, NDArray[Any]] = field(repr=False)
 
@@ -110,8 +112,14 @@ def read_entry(path: Path) -> Entry:
                 arrays[str(name)] = variable.values
             elif variable.dims[-2:] == ("x", "y"):
                 fields[str(name)] = variable.dtype.str
-    plain = {str(name): one for name, one in result.attrs.items() if isinstance(one, str | int | float)}
-    return Entry(path.name, stamp, plain, fields, arrays)
+    of_height = _plain(result["height"].attrs) if "height" in result else {}
+    return Entry(path.name, stamp, _plain(result.attrs), of_height, fields, arrays)
+
+
+def _plain(attributes: Mapping[Any, Any]) -> dict[str, Any]:
+    """Return the attributes that are texts or numbers."""
+    items = {str(name): one.item() if isinstance(one, np.generic) else one for name, one in attributes.items()}
+    return {name: one for name, one in items.items() if isinstance(one, str | int | float)}
 
 
 def _stamp(path: Path) -> list[int]:
@@ -146,7 +154,9 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
         except (InputError, FileNotFoundError) as error:  # damaged, or removed in the meantime
             log.warning("%s", error)
     if {entry.file: entry.stamp for entry in entries.values()} != {name: one.stamp for name, one in cached.items()}:
-        results = [[one.file, one.stamp, one.attributes, one.fields, one.arrays] for one in entries.values()]
+        results = [
+            [one.file, one.stamp, one.attributes, one.of_height, one.fields, one.arrays] for one in entries.values()
+        ]
         write_json(folder / INDEX, {"version": program_version(), "results": results}, _packed)
     return entries
 
@@ -223,6 +233,10 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.
           are NaN. Whole numbers, such as ``status``, become floats.
         - Cases on different grids: histories only, without fields, and a warning in the log names the grids.
 
+        The coordinate ``attributes`` contains the attributes in which the files differ, as JSON. If one case is
+        selected, as in ``results.isel(case=0)``, observables, figures and the audit use its attributes, and read the
+        history of its steps from its file.
+
         Varied parameters are coordinates over ``case``, numbers in SI or strings. The name of each is its dotted key
         with underscores, ``program_0_load``. A sweep with ``realisations`` has ``realisation`` as second dimension, in
         which 0 is the measured surface itself. Values of a realisation without a result are missing, and its key is
@@ -255,7 +269,14 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.
         "case": (("case",), np.array([numbers[key] for key in keys]), {"long_name": "number of the case"}),
         CASE_KEY: (("case",), np.array(keys), VARIABLES[CASE_KEY].attributes),
     }
-    return _by_realisation(_stacked(folder, entries).assign_coords(labels), parameters)
+    found = _by_realisation(_stacked(folder, entries).assign_coords(labels), parameters)
+    found.encoding[CARRIED] = partial(_steps_in, folder)
+    return found
+
+
+def _steps_in(folder: Path, key: str) -> xr.Dataset | None:
+    """Return the history of the steps of a case in a folder, from its file."""
+    return steps_of(open_result(case_path(folder, key, "result")))
 
 
 def _stacked(folder: Path, entries: Sequence[Entry]) -> xr.Dataset:
@@ -283,15 +304,27 @@ def _stacked(folder: Path, entries: Sequence[Entry]) -> xr.Dataset:
     else:
         cells = ", ".join(sorted({f"{len(one['x'])} x {len(one['y'])} cells" for one in grids.values()}))
         log.warning("%s: found %s: opened without fields; open_result gives the fields of each result", folder, cells)
-    others = [entry.attributes for entry in entries]
-    alike = {name: one for name, one in first.attributes.items() if all(other.get(name) == one for other in others)}
+    alike, apart = _common([entry.attributes for entry in entries])
+    of_height, others = _common([entry.of_height for entry in entries])
+    stated = [
+        json.dumps(own | ({"height": heights} if heights else {})) for own, heights in zip(apart, others, strict=True)
+    ]
+    coords[ATTRIBUTES] = "case", np.array(stated, object), VARIABLES[ATTRIBUTES].attributes
     dataset = label(xr.Dataset(variables, coords, {"title": first.case.get("title", ""), **alike}))
+    if "height" in dataset:
+        dataset["height"].attrs |= of_height
     if common:
         return dataset
     counts = np.array([len(one) for one in places])
     rows = ("case", counts, {"long_name": f"number of {AXES[along].rows}", "units": "1"})
     place = (("case", ROW), _side_by_side(places), VARIABLES[along].attributes)
     return dataset.rename_dims({along: ROW}).assign_coords({along: place, ROWS: rows})
+
+
+def _common(attributes: Sequence[Mapping[str, Any]]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Return the attributes that are equal in all cases, and the others of each case."""
+    alike = {name: one for name, one in attributes[0].items() if all(other.get(name) == one for other in attributes)}
+    return alike, [{name: one for name, one in own.items() if name not in alike} for own in attributes]
 
 
 def _side_by_side(histories: Sequence[NDArray[Any]]) -> NDArray[Any]:
@@ -342,7 +375,7 @@ def _by_realisation(flat: xr.Dataset, parameters: Mapping[str, NDArray[Any]]) ->
         return flat
     settings = [identifier(key) for key in parameters if key not in (REALISATION, *DRAWN)]
     of_cases = flat[["case", *settings]].isel(case=np.unique(flat["case"].values, return_index=True)[1]).reset_coords()
-    texts = {name: "" for name, one in flat.variables.items() if one.dtype.kind == "U"}
+    texts = {name: "" for name, one in flat.variables.items() if one.dtype.kind in "UO"}
     runs = flat.drop_vars(["case", REALISATION, *settings]).rename_dims(case="run")
     runs = runs.assign_coords(xr.Coordinates.from_pandas_multiindex(pairs, "run"))
     found = runs.unstack("run", fill_value=texts).transpose("case", REALISATION, ...)
@@ -441,8 +474,8 @@ def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:
     --------
     >>> rv.to_csv(rv.open_result("results/quickstart/cc981638f27a0782.nc"), "quickstart.csv")  # doctest: +SKIP
     """
+    dataset = expect_result(dataset)
     rows = axis_of(dataset)
-    expect_result(dataset)
     names = [name for name, variable in dataset.data_vars.items() if variable.dims == (rows,)]
     table = dataset[names].reset_coords(drop=True).to_dataframe()
     for name in table:

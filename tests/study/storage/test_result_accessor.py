@@ -17,7 +17,6 @@ def test_accessor__gives_observables_and_figures():
     figure = ds.roughvisc.plot_maps(times=[-1])
     assert isinstance(figure, Figure)
     assert [len(ax.images) for ax in figure.axes] == [len(ax.images) for ax in rv.plot.maps(ds, times=[-1]).axes]
-    assert ds.roughvisc.history().sizes == {"time": 3}, "an observable, where a figure is of the same name"
 
 
 def test_plot__of_a_file_that_xarray_alone_has_opened(tmp_path):

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 import xarray as xr
-from support import BALL, FRICTION, LOADS, refused
+from support import BALL, FRICTION, LOADS, ROUGH, refused
 
 import roughvisc as rv
 from roughvisc.errors import InputError
@@ -73,6 +73,46 @@ def test_own_times__have_observables_as_each_result(own_times):
                 if "time" in wanted[variable].dims:
                     np.testing.assert_allclose(found[variable][:count], wanted[variable], 1e-12, err_msg=name)
                     assert found[variable][count:].isnull().all(), variable
+
+
+def test_selected_case__is_judged_as_its_file(tmp_path):
+    """Its attributes, its recipe, its steps and its own rows, although those of other cases differ."""
+    cycle = '[[program]]\ncycle = { mean = "5 mN", amplitude = "2 mN", period = "0.1 s", cycles = 2 }\n'
+    text = (
+        SMALL.replace('[[program]]\nhold = "0.2 s"\n', cycle)
+        .replace("level = 0", "")
+        .replace('[0, "0.1 s", "200 ms"]', '[0, "0.13 s"]')
+    )
+    text = text.replace('boundary = "free"\n', "") + '[audit]\ndensity = "1 g/cm^3"\nthickness = "1 mm"\n'
+    sweeps = (
+        '"surface.radius" = ["10 mm", "5 mm"]\n"program.1.cycle.period" = ["0.1 s", "0.2 s"]',
+        '"keep.times" = [["0.13 s"], [0, "0.11 s", "0.15 s"]]',
+    )
+    for number, keys in enumerate(sweeps):
+        (tmp_path / f"{number}.toml").write_text(f"{text}[sweep]\n{keys}\n")
+        ds = rv.sweep(tmp_path / f"{number}.toml", workers=0, progress=False)
+        for case in (ds.isel(case=0), ds.isel(case=-1)):
+            alone = rv.open_result(tmp_path / "results" / str(number) / f"{case.case_key.item()}.nc")
+            xr.testing.assert_identical(rv.observables.cycle_work(case), rv.observables.cycle_work(alone))
+            xr.testing.assert_identical(case.roughvisc.steps, alone.roughvisc.steps)
+            assert [(one.number, one.sentence) for one in rv.audit(case)] == [
+                (one.number, one.sentence) for one in rv.audit(alone)
+            ]
+            assert rv.audit(case).title == alone.attrs["title"]
+            assert rv.to_csv(case, tmp_path / "a.csv").read_text() == rv.to_csv(alone, tmp_path / "b.csv").read_text()
+
+
+def test_clusters__of_cases_with_different_boundaries_are_refused(tmp_path):
+    """Across the border they are one cluster under one boundary, two under the other."""
+    text = ROUGH.replace("displacement", "gap") + '[sweep]\n"solve.boundary" = ["periodic", "mirror"]\n'
+    (tmp_path / "rough.toml").write_text(text)
+    ds = rv.sweep(tmp_path / "rough.toml", workers=0, progress=False)
+    with refused("boundary"):
+        rv.observables.clusters(ds)
+    for case in (ds.isel(case=0), ds.isel(case=1)):
+        alone = rv.open_result(tmp_path / "results/rough" / f"{case.case_key.item()}.nc")
+        found, wanted = rv.observables.clusters(case), rv.observables.clusters(alone)
+        np.testing.assert_array_equal(found.cluster_count, wanted.cluster_count)
 
 
 def test_own_speeds__are_rows(tmp_path):
