@@ -148,6 +148,10 @@ def test_index__of_lengths_is_the_spacing(corner, tmp_path):
     matrix(path, pd.DataFrame(ROUGH[::-1], y[::-1], x), index_label=corner)  # the largest y first
     with pytest.warns(UserWarning, match="taken as coordinates"):
         np.testing.assert_array_equal(open_scan(path, unit="um"), h)
+    centres = pd.DataFrame(ROUGH, np.arange(20) + 0.5, np.arange(24) + 0.5)
+    matrix(path, centres, index_label=corner)  # in steps of one, and no index
+    with pytest.warns(UserWarning, match="taken as coordinates"):
+        np.testing.assert_allclose(spacing(open_scan(path, unit="um")), (1e-6, 1e-6), rtol=1e-12)
 
 
 def test_index__is_not_seen_in_heights(tmp_path):

@@ -134,11 +134,13 @@ def _matrix(channel: Channel, complaints: list[str]) -> Channel:
         row, column = _step(z[0], z[1:]), _step(z[:, 0], z[:, 1:].T)
     if not (row or column):
         return replace(channel, load=lambda: z.T)
+    labels = np.concatenate([z[0, 1:], z[1:, 0]])
+    is_index = row == column == 1.0 and (labels == np.round(labels)).all()  # cell centres may be 0.5, 1.5, ...
     z = z[int(row is not None) :, int(column is not None) :]
     z = z[:: -1 if (column or 0) < 0 else 1, :: -1 if (row or 0) < 0 else 1]
     removed = " and ".join(name for name, step in (("row", row), ("column", column)) if step)
     spacing, taken = channel.spacing, "an index"
-    if row and column and not row == column == 1.0:
+    if row and column and not is_index:
         spacing, taken = spacing or (abs(row), abs(column)), "coordinates"
     complaints.append(f"the numbers of its first {removed} are in equal steps: taken as {taken}, not as heights")
     return replace(channel, load=lambda: z.T, spacing=spacing)
