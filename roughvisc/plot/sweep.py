@@ -74,8 +74,8 @@ def sweep(results: xr.Dataset, quantity: str | None = None, *, along: str | None
         coefficient.
     along : str, optional
         Dotted key on the horizontal axis, such as ``"program.0.load"``; or ``"time"``, ``"speed"``,
-        ``"reduced_speed"`` for curves of all cases. Default: the key with most numbers, or the
-        speed; if only realisations vary, the time.
+        ``"reduced_speed"`` for curves of all cases, whose lines join the kept rows. Default: the key with most numbers,
+        or the speed; if only realisations vary, the time.
     times : list of float or str, str or int, default -1
         Times, as a list or one text with a unit; the nearest kept times are drawn. Negative whole numbers, also a
         single one, count from the end. [s]

@@ -24,9 +24,11 @@ def test_ball__conducts_as_a_disc_of_its_radius(ball):
     """``4 a / (rho_1 + rho_2)`` with the exact radius of the growing contact."""
     radius = rv.closed_forms.lee_radok(RADIUS, RUBBER, 0.02).radius(ball["time"].values)
     found = conductance(ball, (5.0, 0.02))
-    off = found["thermal_conductance"] / (4 * radius / 5.02) - 1
-    assert np.abs(off).max() < 1.5e-2
-    assert (np.abs(off) < found["thermal_conductance_error"] / found["thermal_conductance"]).all()
+    off = np.abs(found["thermal_conductance"] / (4 * radius / 5.02) - 1)
+    stated = found["thermal_conductance_error"] / found["thermal_conductance"]
+    assert off.max() < 1.5e-2
+    assert (off < stated).all()
+    assert stated.max() < 10 * off.max()
     assert found["thermal_conductance"].attrs["units"] == "W/K"
     assert conductance(ball, ("2 ohm m", 0))["electrical_conductance"].attrs["units"] == "S"
 
