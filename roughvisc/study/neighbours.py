@@ -52,14 +52,14 @@ MODULUS, TIME_SCALE = "modulus", "time scale"
 _ANY_GRID = ("sphere", "cone", "flat_punch", "wavy")
 #: Relative change of a modulus or a time scale, for the derivative of a number.
 _CHANGE = 1.1
-#: Order with which the error of the grid vanishes, and Roache's factor of two grids at this order.
-ORDER = 1.5
-GRID_FACTOR = 3 / (2**ORDER - 1)
+#: Roache's factor of safety of the error of a grid, from two grids.
+GRID_SAFETY = 3.0
 #: Number of other patches, and half-width of the logarithm at 95 % over its standard deviation. For six patches
 #: Student's factor is 2.57. A larger factor is used, because all patches have the spectrum of one patch, whose longest
 #: waves vary from patch to patch.
 _PATCHES, _SAMPLE_FACTOR = 6, 3.3
-#: Largest ratio of the wavelength above which 99 % of the slope lie to the shortest wavelength of the spectrum.
+#: Largest ratio of two shortest wavelengths that count as equal: the wavelength above which 99 % of the slope lie, and
+#: the shortest wavelength of the spectrum.
 _SAME = 1.15
 
 
@@ -83,6 +83,8 @@ class Observable:
     octave_factor : float
         Largest change by the next octave of waves, over the change by the last octave. The factors were chosen on 45
         rough surfaces, and their coverage was measured on others (workflows/benchmarks/whole_error.py). [-]
+    grid_order : float
+        Order with which the error of the grid vanishes; of the gap on the same surfaces. [-]
     follows : {"pressure", "approach", "area", "gap"}
         Quantity whose stated error determines the error of the number.
     """
@@ -91,6 +93,7 @@ class Observable:
     derive: Callable[[xr.Dataset, Observe], xr.DataArray] | None = None
     fields: tuple[str, ...] = ()
     octave_factor: float = 1.1
+    grid_order: float = 1.5
     follows: Literal["pressure", "approach", "area", "gap"] = "pressure"
 
     def of(self, result: xr.Dataset, case: Case) -> Array:
@@ -133,12 +136,12 @@ QUANTITIES = {
     one.name: one
     for one in (
         Observable("contact_area", octave_factor=2.0, follows="area"),
-        Observable("mean_gap", follows="approach"),
+        Observable("mean_gap", grid_order=2.0, follows="approach"),
         Observable("approach", follows="approach"),
         Observable("force"),
         Observable("friction_coefficient", octave_factor=1.8),
         Observable("leak_rate", _leak_rate, ("gap",), follows="gap"),
-        Observable("thermal_conductance", _thermal_conductance, ("pressure",), 2.5, "area"),
+        Observable("thermal_conductance", _thermal_conductance, ("pressure",), 1.5, follows="area"),
     )
 }
 
@@ -232,14 +235,29 @@ class Neighbour:
     ----------
     case : Case
     weight : float
-        Half-width of the logarithm of a number at 95 %, over the change of the logarithm. [-]
+        Half-width of the logarithm of a number at 95 %, over the change of the logarithm; on a coarser grid, over the
+        error of the case's own grid. [-]
     against : Case
-        Case for the comparison.
+        Case for the comparison, with the same waves.
+    resolution : float, optional
+        Cells per shortest wave on a coarser grid, over the cells per shortest wave of the case. Default: the grid is
+        the same. [-]
     """
 
     case: Case
     weight: float
     against: Case
+    resolution: float | None = None
+
+    def weight_of(self, quantity: Observable) -> float:
+        """Return the half-width of the logarithm of a quantity at 95 %, over its change. [-]
+
+        The error of a grid goes with a power of its resolution, the order. On cells twice as long it changes by
+        ``1 - 2**-order`` times its value on the long cells.
+        """
+        if self.resolution is None:
+            return self.weight
+        return self.weight * self.resolution**quantity.grid_order / (1 - 2**-quantity.grid_order)
 
 
 @dataclass(frozen=True)
@@ -259,6 +277,34 @@ class Source:
     method: str
     neighbours: tuple[Neighbour, ...] = ()
     is_open: bool = False
+
+
+def coarser_grids(base: Case, height: xr.DataArray, coarsening: float) -> tuple[Neighbour, ...]:
+    """Return a case on cells twice and four times as long, each against the same waves on cells half as long.
+
+    A long cell cannot hold the shortest waves of a sample. Therefore they are left out on the shorter cells, too: the
+    change is an error of the grid, without the effect of the waves. The relative effect of an unresolved wave goes with
+    its amplitude, about in proportion to its length.
+
+    Parameters
+    ----------
+    base : Case
+        The case.
+    height : xarray.DataArray
+        Its surface. [m]
+    coarsening : float
+        Length of the cells whose error is wanted, over the length of the cells of the case.
+    """
+    cell, is_limited = coarsening * max(spacing(height)), is_sample(base, height)
+    wave = max(shortest_wave(height), 2 * cell) if is_limited else math.inf
+    fine, before, found = on_cells(base, height, coarsening), wave, []
+    for part in (2.0, 4.0):  # two grids may agree by chance
+        coarse, shortest = on_cells(base, height, part * coarsening), max(wave, 2 * part * cell)
+        against = vary(fine, {"surface.shortest_wave": shortest}) if shortest > _SAME * before else fine
+        longer = shortest / wave if is_limited else 1.0
+        found.append(Neighbour(coarse, GRID_SAFETY / longer, against, longer / part))
+        fine, before = coarse, shortest
+    return tuple(found)
 
 
 def sources_of(
@@ -288,9 +334,7 @@ def sources_of(
     if cutoff is not None:
         cutoff = number(cutoff, "m", "cutoff", above=0)
     sample, others = is_sample(base, height), others or coarsening
-    own, coarse, coarsest = (on_cells(base, height, part * coarsening) for part in (1.0, 2.0, 4.0))
-    # two grids may agree by chance
-    grids = Neighbour(coarse, GRID_FACTOR, own), Neighbour(coarsest, GRID_FACTOR / 2**ORDER, coarse)
+    grids = coarser_grids(base, height, coarsening)
     own, coarse = (on_cells(base, height, part * others) for part in (1.0, 2.0))
     found = {STEPS: Source("errors that the result states"), GRID: Source("cells twice and four times as long", grids)}
 
@@ -435,7 +479,9 @@ def _budget(
     with np.errstate(divide="ignore", invalid="ignore"):
         logarithms = {key: np.log(one) for key, one in values.items()}
         for i, (name, source) in enumerate(sources.items()):
-            change = [n.weight * (logarithms[n.case.key] - logarithms[n.against.key]) for n in source.neighbours]
+            change = [
+                n.weight_of(quantity) * (logarithms[n.case.key] - logarithms[n.against.key]) for n in source.neighbours
+            ]
             if name == STEPS:
                 half_width[i] = quantity.stated_error(own, value)
             elif not change:

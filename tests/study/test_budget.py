@@ -78,12 +78,15 @@ def test_time_scale__of_a_fluid_under_a_ball(tmp_path):
     assert width(found, "time scale") == pytest.approx(-2 / 3 * slope * np.log(1.05), rel=0.03)
 
 
-def test_grid__holds_the_change_to_cells_half_as_long(tmp_path):
+def test_grid__holds_the_change_to_cells_half_as_long_and_not_much_more(tmp_path):
+    """Long cells lose short waves, which is no error of the short cells."""
     study = case(ROUGH, tmp_path)
     fine = rv.run(rv.vary(study, {"surface.resample": [108, 100]}), out=tmp_path / "fine", progress=False)
-    for name in ("contact_area", "mean_gap"):
-        found = stated(study, tmp_path, name)
-        assert (np.abs(np.log(fine[name] / found["value"])) < found["half_width"].sel(source="grid")).all()
+    over = []
+    for name, found in stated(study, tmp_path, ["contact_area", "mean_gap"]).items():
+        over.append(found["half_width"].sel(source="grid") / np.abs(np.log(fine[name] / found["value"])))
+    assert np.min(over) > 1
+    assert np.median(over) < 10
 
 
 def test_missing_waves__count_on_one_side(tmp_path):
