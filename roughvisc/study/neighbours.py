@@ -83,8 +83,9 @@ class Observable:
     octave_factor : float
         Largest change by the next octave of waves, over the change by the last octave. The factors were chosen on 45
         rough surfaces, and their coverage was measured on others (workflows/benchmarks/whole_error.py). [-]
-    grid_order : float
-        Order with which the error of the grid vanishes; of the gap on the same surfaces. [-]
+    grid_order, wave_order : float
+        Powers of the cells per wave and of the wavelength, with which the relative effect of an unresolved wave falls
+        and grows; chosen on the same surfaces. An effect on the gap goes with the amplitude of the wave. [-]
     follows : {"pressure", "approach", "area", "gap"}
         Quantity whose stated error determines the error of the number.
     """
@@ -94,6 +95,7 @@ class Observable:
     fields: tuple[str, ...] = ()
     octave_factor: float = 1.1
     grid_order: float = 1.5
+    wave_order: float = 1.0
     follows: Literal["pressure", "approach", "area", "gap"] = "pressure"
 
     def of(self, result: xr.Dataset, case: Case) -> Array:
@@ -135,7 +137,7 @@ def _leak_rate(result: xr.Dataset, observe: Observe) -> xr.DataArray:
 QUANTITIES = {
     one.name: one
     for one in (
-        Observable("contact_area", octave_factor=2.0, follows="area"),
+        Observable("contact_area", octave_factor=2.0, wave_order=0.5, follows="area"),
         Observable("mean_gap", grid_order=2.0, follows="approach"),
         Observable("approach", follows="approach"),
         Observable("force"),
@@ -242,22 +244,26 @@ class Neighbour:
     resolution : float, optional
         Cells per shortest wave on a coarser grid, over the cells per shortest wave of the case. Default: the grid is
         the same. [-]
+    longer : float
+        Shortest wave on a coarser grid, over the shortest wave of the case. [-]
     """
 
     case: Case
     weight: float
     against: Case
     resolution: float | None = None
+    longer: float = 1.0
 
     def weight_of(self, quantity: Observable) -> float:
         """Return the half-width of the logarithm of a quantity at 95 %, over its change. [-]
 
-        The error of a grid goes with a power of its resolution, the order. On cells twice as long it changes by
-        ``1 - 2**-order`` times its value on the long cells.
+        The error of a grid goes with powers of its resolution and of the shortest wave. From long cells to cells half
+        as long, with the same waves, it changes by ``1 - 2**-grid_order`` times its value on the long cells.
         """
         if self.resolution is None:
             return self.weight
-        return self.weight * self.resolution**quantity.grid_order / (1 - 2**-quantity.grid_order)
+        on_long_cells = self.weight / (1 - 2**-quantity.grid_order)
+        return on_long_cells * self.resolution**quantity.grid_order / self.longer**quantity.wave_order
 
 
 @dataclass(frozen=True)
@@ -283,8 +289,7 @@ def coarser_grids(base: Case, height: xr.DataArray, coarsening: float) -> tuple[
     """Return a case on cells twice and four times as long, each against the same waves on cells half as long.
 
     A long cell cannot hold the shortest waves of a sample. Therefore they are left out on the shorter cells, too: the
-    change is an error of the grid, without the effect of the waves. The relative effect of an unresolved wave goes with
-    its amplitude, about in proportion to its length.
+    change is an error of the grid, without the effect of the waves.
 
     Parameters
     ----------
@@ -302,7 +307,7 @@ def coarser_grids(base: Case, height: xr.DataArray, coarsening: float) -> tuple[
         coarse, shortest = on_cells(base, height, part * coarsening), max(wave, 2 * part * cell)
         against = vary(fine, {"surface.shortest_wave": shortest}) if shortest > _SAME * before else fine
         longer = shortest / wave if is_limited else 1.0
-        found.append(Neighbour(coarse, GRID_SAFETY / longer, against, longer / part))
+        found.append(Neighbour(coarse, GRID_SAFETY, against, longer / part, longer))
         fine, before = coarse, shortest
     return tuple(found)
 
