@@ -322,9 +322,9 @@ def _stacked(folder: Path, entries: Sequence[Entry]) -> xr.Dataset:
 
 
 def _common(attributes: Sequence[Mapping[str, Any]]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Return the attributes that are equal in all cases, and the others of each case."""
+    """Return the attributes that are equal in all cases, and the others of each case without the date of its run."""
     alike = {name: one for name, one in attributes[0].items() if all(other.get(name) == one for other in attributes)}
-    return alike, [{name: one for name, one in own.items() if name not in alike} for own in attributes]
+    return alike, [{name: one for name, one in own.items() if name not in (*alike, "history")} for own in attributes]
 
 
 def _side_by_side(histories: Sequence[NDArray[Any]]) -> NDArray[Any]:
