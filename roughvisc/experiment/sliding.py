@@ -49,6 +49,7 @@ _COUNTING_CAUTION = 1.5
 #: The friction force from the slope is meaningful if it differs from the force from the power by at most this fraction.
 #: At low speed on a rough surface it is the difference of two large forces.
 _MEANINGFUL = 0.1
+_MORE_INSTANTANEOUS = "a material with more instantaneous compliance"
 
 
 @quantities(speeds="m/s", load="N > 0", pressure="Pa > 0")
@@ -207,7 +208,8 @@ class SlidingRows(Rows):
                 try:
                     found = steady_state(sliding, xp.asarray(cells.gap), self._force, tolerance=tolerance)
                 except ConvergenceError as error:
-                    advice = "try a looser tolerance, a coarser grid, or layers whose moduli differ less"
+                    softer = "layers whose moduli differ less" if len(law.materials) > 1 else _MORE_INSTANTANEOUS
+                    advice = f"try a looser tolerance, a coarser grid, or {softer}"
                     raise ConvergenceError(f"at {format_quantity(speed, 'm/s')}: {error}; {advice}") from error
                 pressure, contact = to_host(found.pressure), to_host(found.pressure) > 0
                 gap = np.where(contact, 0.0, np.maximum(cells.gap + to_host(found.displacement) - found.approach, 0.0))

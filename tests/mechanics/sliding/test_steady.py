@@ -108,8 +108,8 @@ def test_low_speed__has_the_friction_of_a_tighter_tolerance():
     assert exact.power_force == pytest.approx(10 * low.power_force, rel=0.05)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_loss_tangent_of_ten_thousand__is_solved_despite_a_preconditioner_in_single_precision(seed):
+@pytest.mark.parametrize("seed", range(2))
+def test_loss_tangent_of_ten_thousand__is_solved(seed):
     height = rv.from_array(1e-7 * np.random.default_rng(seed).standard_normal((16, 12)), spacing=1e-6)
     settings = {"speeds": [0.4], "pressure": 1e5, "boundary": "periodic", "fields": ("pressure",), "progress": False}
     found, tight = (
@@ -119,3 +119,43 @@ def test_loss_tangent_of_ten_thousand__is_solved_despite_a_preconditioner_in_sin
     apart = float(np.abs(found.pressure - tight.pressure).sum() / tight.pressure.sum())
     assert apart < float(found.stated_error[0]) < 1e-3
     assert float(found.friction_force[0]) == pytest.approx(float(tight.friction_force[0]), rel=1e-3)
+
+
+def test_two_periods_of_a_gel__slide_like_one():
+    """A Kelvin-Voigt gel without instantaneous compliance: the stiffness of its waves spans seven decades."""
+    gel = rv.kelvin_voigt(1e6 / 0.64, 0.25e6)
+    height = 1e-7 * np.random.default_rng(0).random((12, 13))
+    one, two = (
+        rv.friction(
+            rv.from_array(np.tile(height, (copies, 1)), 1e-6), gel, pressure=5e4, speeds=1e-3, grid_error=False,
+            progress=False,
+        )
+        for copies in (1, 2)
+    )  # fmt: skip
+    stated = float(one.stated_error[0] + two.stated_error[0])
+    assert stated < 2e-3
+    assert float(two.friction_coefficient[0]) == pytest.approx(float(one.friction_coefficient[0]), rel=stated)
+
+
+def test_two_cells_that_compete_for_the_load__are_solved():
+    """Two crests of almost equal height under a light load, on a material with a loss tangent of about ten."""
+    x = (np.arange(25) + 0.5) / 25
+    height = 1e-9 * (np.cos(2 * np.pi * (x - 0.3)) + 0.6 * np.cos(6 * np.pi * (x - 0.7)))
+    load = 0.1 * PERIOD**2 / 25
+    exact = dense(height, half_space_symbol(rubber(300.0), 10.0), load)
+    found = slid(height[:, None], rubber(300.0), 10.0, load, tolerance=1e-4)
+    assert np.count_nonzero(exact) == 2
+    assert np.abs(found.pressure[:, 0] - exact).sum() <= 2e-4 * exact.sum()
+
+
+def test_friction_far_beyond_full_contact__is_that_of_the_wave():
+    """The pressure is almost uniform, and friction is of second order in its variation."""
+    amplitude, k, cells = 1e-6, 2 * math.pi / PERIOD, 24
+    modulus = 1 / complex(complex_compliance(rubber(), k * 0.16))
+    pressure = 400 * amplitude * k * abs(modulus) / 2
+    found = rv.friction(
+        rv.from_array(wave(cells, amplitude, 2), PERIOD / cells), rubber(), speeds=0.16, pressure=pressure,
+        tolerance=1e-2, grid_error=False, progress=False,
+    )  # fmt: skip
+    exact = k**2 * amplitude**2 * modulus.imag / (4 * pressure)
+    assert float(found.friction_coefficient[0]) == pytest.approx(exact, rel=float(found.stated_error[0]))
