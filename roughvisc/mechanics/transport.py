@@ -5,6 +5,10 @@ r"""Leakage through the gap, conduction through contact spots, and connected clu
 The cells on a path from one side to the other and the faces between them form a network of resistors. A small network
 is solved by direct factors, a large one by conjugate gradients on two grids.
 
+Direct factors lose all digits if conductances span more than about twelve decades: the weak faces of a wide basin are
+rounded away in the diagonal of the equations. Then the network is eliminated cell by cell in sums of positive numbers
+only [3]_.
+
 A cell of the coarse network is a set of cells of a block that strong faces connect. Smoothed aggregation [1]_ carries
 its pressure to the cells: the pressure of the coarse cell, :math:`T p`, followed by one Jacobi step,
 :math:`(1 - \omega D^{-1} A) T`. Jacobi steps before and after reduce errors that differ from one cell to the
@@ -31,12 +35,14 @@ Grid error, measured on discs, squares at any angle, strips and Hertz contacts:
 .. [1] P. Vaněk, J. Mandel, M. Brezina, Algebraic multigrid by smoothed aggregation for second and fourth order elliptic
    problems, Computing 56 (1996) 179-196.
 .. [2] J. R. Barber, *Proc. R. Soc. A* 459 (2003) 53-66.
+.. [3] W. K. Grassmann, M. I. Taksar, D. P. Heyman, Oper. Res. 33 (1985) 1107-1116.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import partial
 from itertools import repeat
 from typing import Any, NamedTuple
@@ -58,6 +64,9 @@ _CLOSE = 1e-9
 _LARGE, _ON_TWO_GRIDS = 2**12, (1e-16, 1e-2, 1e-2, 1e-2)
 #: Largest number of rounds with direct factors.
 _BY_FACTORS = 8
+#: Largest number of rounds of the elimination without subtractions, and its largest number of multiplications: some
+#: seconds.
+_BY_ELIMINATION, _MOST_PRODUCTS = 9, 2**32
 #: Number of cells along the side of a block: larger blocks mean fewer coarse cells and more iterations.
 _BLOCK = 4
 #: A face is strong if its conductance is at least this part of the geometric mean of the diagonals of its two cells.
@@ -159,7 +168,9 @@ def flow(gap: Array, spacing: tuple[float, float], *, wrap: bool = False) -> Flo
     mobility of the cell times the same ratio. These conductances are exact for a gap that depends on one coordinate and
     is constant in each cell, and of second order in the sides of the cells for a smooth gap. Small maps are solved with
     SciPy's direct factors in minimum-degree order, large ones by conjugate gradients on two grids. If the conductances
-    span too many decades for two grids, direct factors follow.
+    span too many decades for two grids, direct factors follow. If they span too many decades for the factors, the cells
+    are eliminated without subtractions. Networks too large for this elimination, from about 256 cells a side, state an
+    error as large as the conductance.
 
     By Dirichlet's principle the dissipation of approximate pressures exceeds the conductance [2]_. The excess is the
     work of what flows into the cells and not out of them on the remaining error of the pressures, which the next round
@@ -187,12 +198,29 @@ def flow(gap: Array, spacing: tuple[float, float], *, wrap: bool = False) -> Flo
         drop = inlet - difference @ pressure
         left = difference.T @ (faces * drop)
         step = solve(left)
-        conductance, error = float(faces @ drop**2), abs(float(left @ step))
+        conductance = float(faces @ drop**2)
+        if step is None:
+            continue
+        error = abs(float(left @ step))
         # the factors lose digits for a wide basin behind narrow slits; each round recovers some
         pressure = np.clip(pressure + step, 0.0, 1.0)
         if error <= _CLOSE * conductance:
+            drop = inlet - difference @ pressure
             break
-    flux = scale * faces * (inlet - difference @ pressure)
+    else:
+        if cells.size * ny**2 > _MOST_PRODUCTS:  # any pressures give an upper bound, and zero is a lower bound
+            drop = inlet - difference @ np.nan_to_num(pressure)
+            conductance = error = float(faces @ drop**2)
+        else:
+            solve_exactly, drop = _elimination(faces, cells, (nx, ny)), inlet.copy()
+            for _ in range(_BY_ELIMINATION):
+                left = difference.T @ (faces * drop)
+                step = solve_exactly(left)
+                conductance, error = float(faces @ drop**2), abs(float(left @ step))
+                drop -= difference @ step  # not from the pressures, whose differences lose digits in a basin
+                if max(error, float(abs(left).max())) <= _CLOSE * conductance:
+                    break
+    flux = scale * faces * drop
     along, across = flux[: (nx + 1) * ny].reshape(nx + 1, ny), flux[(nx + 1) * ny :].reshape(nx, ny)
     along, across = along[1:] + along[:-1], across + np.roll(across, 1, axis=1)
     return Flow(conductance * scale, error * scale, along / 2 / spacing[1], across / 2 / spacing[0])
@@ -242,12 +270,13 @@ def _differences(cells: Numbers, nx: int, ny: int) -> sparse.csr_array:
     return pressures(behind) - pressures(before)
 
 
-def _solvers(matrix: sparse.csr_array, cells: Numbers, width: int) -> Iterator[Callable[[Array], Array]]:
-    """Yield the solver of each round: two grids for a large network, then direct factors."""
-    if cells.size >= _LARGE:
-        solve = _solver_on_two_grids(matrix, cells, width)
-        yield from (partial(solve, enough) for enough in _ON_TWO_GRIDS)
-    yield from repeat(_factors(matrix), _BY_FACTORS)
+def _solvers(matrix: sparse.csr_array, cells: Numbers, width: int) -> Iterator[Callable[[Array], Array | None]]:
+    """Yield the solver of each round: two grids for a large network, then direct factors, unless they are singular."""
+    with suppress(RuntimeError):
+        if cells.size >= _LARGE:
+            solve = _solver_on_two_grids(matrix, cells, width)
+            yield from (partial(solve, enough) for enough in _ON_TWO_GRIDS)
+        yield from repeat(_factors(matrix), _BY_FACTORS)
 
 
 def _factors(matrix: sparse.csr_array) -> Callable[[Array], Array]:
@@ -262,11 +291,78 @@ def _factors(matrix: sparse.csr_array) -> Callable[[Array], Array]:
     return lambda source: scale * found.solve(scale * source)
 
 
-def _solver_on_two_grids(matrix: sparse.csr_array, cells: Numbers, width: int) -> Callable[[float, Array], Array]:
+def _elimination(faces: Array, cells: Numbers, shape: tuple[int, int]) -> Callable[[Array], Array]:
+    """Return a solver that eliminates the cells in order, each replaced by faces between its neighbours.
+
+    All numbers are sums, products and ratios of conductances. Therefore each pressure due to positive sources is
+    accurate to rounding.
+
+    Parameters
+    ----------
+    faces : ndarray
+        Conductances, see :func:`_conductances`.
+    cells : ndarray of int, shape (n,)
+        Indices of the cells in the flattened map, ascending.
+    shape : tuple of int
+        Shape of the map.
+    """
+    nx, ny = shape
+    along, across = faces[: (nx + 1) * ny].reshape(nx + 1, ny), faces[(nx + 1) * ny :].reshape(nx, ny)
+    # The front: for each column, the first cell that is not eliminated yet. Its faces to the others and to both sides.
+    between, outside = np.zeros((ny, ny)), along[0].copy()
+    shares, totals = np.zeros((cells.size, ny)), np.zeros(cells.size)
+    number = np.full(nx * ny, -1)
+    number[cells] = np.arange(cells.size)
+
+    def enter(row: int, column: int) -> None:
+        """Add the faces of a cell of the front to the outlet and to the cells before it in its row."""
+        if row == nx - 1:
+            outside[column] += along[nx, column]
+        neighbours_before = [(column - 1, across[row, column - 1])] if column else []
+        if column == ny - 1:
+            neighbours_before.append((0, across[row, column]))
+        for other, face in neighbours_before:
+            between[column, other] += face
+            between[other, column] += face
+
+    for column in range(ny):
+        enter(0, column)
+    for index, (row, column) in enumerate(np.ndindex(nx, ny)):
+        weights, own = between[column].copy(), outside[column]
+        weights[column] = along[row + 1, column] if row < nx - 1 else 0.0  # the next cell of the column takes the place
+        between[column], between[:, column], outside[column] = 0.0, 0.0, 0.0
+        total = float(weights.sum() + own)
+        if number[index] >= 0 and total > 0:
+            share = weights / total
+            shares[number[index]], totals[number[index]] = share, total
+            between += weights[:, None] * share
+            outside += own * share
+        if row < nx - 1:
+            enter(row + 1, column)
+    columns = cells % ny
+
+    def solve(source: Array) -> Array:
+        received, pressure = source.copy(), np.zeros_like(source)
+        passed_on, front = np.zeros(ny), np.zeros(ny)
+        for cell, column in enumerate(columns):
+            received[cell] += passed_on[column]
+            passed_on[column] = 0.0
+            passed_on += shares[cell] * received[cell]
+        for cell in range(cells.size - 1, -1, -1):
+            driven = received[cell] / totals[cell] if totals[cell] > 0 else 0.0
+            pressure[cell] = front[columns[cell]] = driven + shares[cell] @ front
+        return pressure
+
+    return solve
+
+
+def _solver_on_two_grids(
+    matrix: sparse.csr_array, cells: Numbers, width: int
+) -> Callable[[float, Array], Array | None]:
     """Return a solver by preconditioned conjugate gradients: from a source in each cell to the pressures of the cells.
 
     Its first argument is the relative error of the energy at which the iteration ends. If it does not converge, it
-    returns its last iterate.
+    returns its last iterate. If rounding ends the iteration, it returns None.
 
     Parameters
     ----------
@@ -290,7 +386,7 @@ def _solver_on_two_grids(matrix: sparse.csr_array, cells: Numbers, width: int) -
         found += prolongation @ on_coarse(restriction @ (left - matrix @ found))
         return found + weight * (left - matrix @ found)
 
-    def solve(enough: float, source: Array) -> Array:
+    def solve(enough: float, source: Array) -> Array | None:
         pressure, left = np.zeros_like(source), source.copy()
         direction, before, energy = np.zeros_like(source), 1.0, 0.0
         for _ in range(_MOST):
@@ -299,8 +395,10 @@ def _solver_on_two_grids(matrix: sparse.csr_array, cells: Numbers, width: int) -
             direction = better + product / before * direction
             through = matrix @ direction
             power = float(direction @ through)
-            if not (product > enough * energy and power > 0):
+            if 0 <= product <= enough * energy:
                 break
+            if not (product > 0 and power > 0):
+                return None
             length = product / power
             pressure += length * direction
             left -= length * through

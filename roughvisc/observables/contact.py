@@ -149,8 +149,8 @@ def leakage(
     viscosity : float or str
         Viscosity of the fluid, constant: a number [Pa s], or a text such as ``"1 mPa s"``.
     pressure_drop : float or str
-        Pressure difference between the two sides, over the whole length of the map (one period if it is periodic): a
-        number [Pa], or a text such as ``"1 bar"``.
+        Pressure difference between the two sides, over the whole length of the map: a number [Pa], or a text such as
+        ``"1 bar"``.
     along : {"x", "y"}
         Direction of the flow. The other two sides are joined if the attribute ``boundary`` of the result is
         ``"periodic"``; otherwise they are walls.
@@ -178,7 +178,12 @@ def leakage(
 
     .. math:: T = \frac{Q \eta L}{\Delta P \, W}, \qquad h = (12 T)^{1/3}.
 
+    The map is one sample: the fluid has one pressure along the side of the first cells and another along the side of
+    the last cells. Periodic boundaries of the contact join only the other two sides. The leak rate of one period
+    therefore depends on the place along the flow at which the period begins.
+
     The error is the error of the solution of the equations on this grid, without the errors of the grid and of the gap.
+    It is as large as the leak rate if the gaps of a large map span too many decades for the solver.
 
     Examples
     --------
