@@ -141,7 +141,7 @@ VARIABLES: dict[str, Variable] = {
     "grid_error_approach": Variable(_SERIES, "1", "grid error of the approach", _COARSER),
     "grid_error_gap": Variable(_SERIES, "1", "grid error of the gap", f"mean gap; {_COARSER}"),
     "grid_error_area": Variable(_SERIES, "1", "grid error of the area", _COARSER),
-    "grid_error_friction": Variable(_SERIES, "1", "grid error of friction", _COARSER),
+    "grid_error_friction": Variable(_SERIES, "1", "grid error of friction", f"missing below three cells; {_COARSER}"),
     "status": Variable(_STEPS, "", "how the step ended", dtype="int8", meanings=STATUS_MEANINGS),
     "convolutions": Variable(_STEPS, "1", "convolutions", "since the last step, or of the speed", dtype="int32"),
     "wall_time": Variable(_STEPS, "s", "wall time", "since the start of the run"),

@@ -101,6 +101,8 @@ _COUNTING = 0.5
 #: cell centres may be wider than one cell. At 0.999 of the pressure of full contact the hidden area is 2.3 times the
 #: open area of a wave on 64 cells, and 4.7 times the open area on 32 cells.
 _HIDDEN = 1.5
+#: Size that stands for zero in a ratio.
+_ZERO = 1e-300
 #: Approaches of both grids that differ by less than this part of the largest approach were prescribed.
 _GIVEN = 1e-12
 
@@ -123,8 +125,9 @@ def with_grid_error(
     -----
     Errors are relative to the largest value of the quantity, the error of the pressure (L1) to the largest force.
     ``grid_error`` is the largest error of pressure, force and approach. All runs have an error in time within the
-    tolerance, so the estimates are meaningless far below the tolerance. They are missing if the coarser run fails. The
-    coarser grid has all waves that it can resolve, see :func:`coarser`.
+    tolerance, so the estimates are meaningless far below the tolerance. They are missing if the coarser run fails, and
+    for a quantity that is zero in all rows but may differ from zero: zero has no relative error. The coarser grid has
+    all waves that it can resolve, see :func:`coarser`.
     """
     histories = [name for name in GRID_ERROR if name in dataset and name != "pressure"]
     times = dataset["time"].values.tolist()
@@ -137,7 +140,7 @@ def with_grid_error(
         log.warning("no grid error: the coarser solve failed: %s", error)
         missing = "time", np.full(len(times), math.nan)
         return dataset.assign({GRID_ERROR[name]: missing for name in ("pressure", *histories)})
-    largest = {name: float(np.fmax.reduce(np.abs(dataset[name].values), initial=1e-300)) for name in histories}
+    largest = {name: float(np.fmax.reduce(np.abs(dataset[name].values), initial=_ZERO)) for name in histories}
     off = {name: np.abs(coarse[name].values - dataset[name].values) for name in histories}
     apart = {"pressure": pressure_distance(coarse, dataset) / largest["force"]}
     apart |= {name: off[name] / largest[name] for name in histories}
@@ -145,11 +148,24 @@ def with_grid_error(
     for name, difference in apart.items():
         safety, order = _ONE_COARSER.get(name, _ONE_COARSER_USUAL)
         found[name] = safety * difference / (ratio**order - 1)
-    is_given, peak = off["approach"] < _GIVEN * largest["approach"], _peak(height)
+    is_given = off["approach"] < _GIVEN * largest["approach"]
+    periodic = dataset.attrs["boundary"] == "periodic"
+    peak = 0.0 if indenter_of(height) is not None else hidden_peak(height.values, periodic)
     rows = [_least_errors(dataset, row, largest, bool(is_given[row]), peak) for row in range(len(times))]
     errors = grid_errors(found, {name: np.array([row[name] for row in rows]) for name in rows[0]})
+    for name in histories:
+        errors[GRID_ERROR[name]] = missing_of_zero(errors[GRID_ERROR[name]], largest[name])
     errors["grid_error"] = np.maximum(errors["grid_error"], errors["grid_error_approach"])
     return dataset.assign({name: ("time", values) for name, values in errors.items()})
+
+
+def missing_of_zero(error: ArrayLike, size: float) -> Array:
+    """Return relative errors of a quantity of some size; NaN if it is zero, but has an error.
+
+    Sizes up to 1e-300 count as zero.
+    """
+    error = np.asarray(error, dtype=float)
+    return error if size > _ZERO else np.where(error > 0, math.nan, error)
 
 
 def grid_errors(found: Mapping[str, Array], least: Mapping[str, Array]) -> dict[str, Array]:
@@ -169,18 +185,23 @@ def grid_errors(found: Mapping[str, Array], least: Mapping[str, Array]) -> dict[
     return errors
 
 
-def _peak(height: xr.DataArray) -> float:
-    """Return the possible height of the peak above the centre of the highest cell; zero for indenters. [m]
+def hidden_peak(height: Array, periodic: bool) -> float:
+    """Return the possible height of the peak above the centre of the highest cell. [m]
 
     The bound is half of the descent to the lower neighbour, summed over both axes: the flanks of a cone meet no higher.
+
+    Parameters
+    ----------
+    height : ndarray, shape (nx, ny)
+        Heights of the surface; NaN at absent cells. [m]
+    periodic : bool
+        Whether the surface repeats.
     """
-    if indenter_of(height) is not None:
-        return 0.0
-    values = height.values
-    at = np.unravel_index(int(np.nanargmax(values)), values.shape)
-    lines = (values[:, at[1]], values[at[0]])
-    lowest = (np.fmin.reduce(line[max(i - 1, 0) : i + 2]) for line, i in zip(lines, at, strict=True))
-    return float(sum(values[at] - low for low in lowest)) / 2
+    beyond: Any = "wrap" if periodic else "clip"
+    at = np.unravel_index(int(np.nanargmax(height)), height.shape)
+    lines = (height[:, at[1]], height[at[0]])
+    lowest = (np.fmin.reduce(line.take([i - 1, i, i + 1], mode=beyond)) for line, i in zip(lines, at, strict=True))
+    return float(sum(height[at] - low for low in lowest)) / 2
 
 
 def _least_errors(
@@ -199,7 +220,7 @@ def _least_errors(
     given : bool
         Whether the approach is prescribed, not the load.
     peak : float
-        Possible height of the peak above the highest cell, see :func:`_peak`. [m]
+        Possible height of the peak above the highest cell, see :func:`hidden_peak`. [m]
     """
     here = {name: float(dataset[name][row]) for name in ("force", "approach", "contact_area", "contact_area_counted")}
     wide = largest["mean_gap"]
@@ -219,16 +240,16 @@ def _least_errors(
     # Full contact on this grid may hide small openings.
     hidden, gap = hidden_opening(pressure, height, dataset.attrs["boundary"] == "periodic")
     least["contact_area"] = max(least["contact_area"], hidden * area)
-    least["mean_gap"] = max(least["mean_gap"], gap / max(gap, wide) if gap > 0 else 0.0)
+    least["mean_gap"] = max(least["mean_gap"], gap / wide)
     # The edge of the contact lies anywhere in its cells.
-    at_edge, at_end, faces, ends = _edge(contact, present & ~contact, dataset.attrs["boundary"])
+    at_edge, at_end, faces, ends, outline = _edge(contact, present, dataset.attrs["boundary"])
     total = float(pressure.sum())
     share = float(pressure[at_edge].sum()) / total
     unknown = _AT_EDGE * share / (1 - (1 - _AT_EDGE) * share)  # 1 if all contact cells lie at the edge
     unknown += _AT_END * float(pressure[at_end & ~at_edge].sum()) / total
     counted = here["contact_area_counted"] / largest["contact_area"]
     least["pressure"] = max(least["pressure"], unknown * force)
-    least["contact_area"] = max(least["contact_area"], counting_error(contact, faces) * counted)
+    least["contact_area"] = max(least["contact_area"], counting_error(contact, faces + outline) * counted)
     # The edge of the material: a wider punch sinks in less, or carries more.
     found = "force" if given else "approach"
     least[found] = max(least[found], counting_error(contact, ends))
@@ -280,16 +301,22 @@ def counting_error(contact: Mask, faces: int) -> float:
     return _COUNTING * math.sqrt(images * faces) / np.count_nonzero(contact)
 
 
-def _edge(contact: Mask, free: Mask, boundary: Boundary) -> tuple[Mask, Mask, int, int]:
-    """Return the contact cells next to free cells and those next to absent cells, and the number of faces to each."""
-    at_edge, at_end, faces, ends = np.zeros_like(contact), np.zeros_like(contact), 0, 0
-    for beside, material in zip(neighbours(free, boundary), neighbours(free | contact, boundary), strict=True):
-        here = contact & beside
-        faces += int(np.count_nonzero(here))
-        at_edge |= here
+def _edge(contact: Mask, present: Mask, boundary: Boundary) -> tuple[Mask, Mask, int, int, int]:
+    """Return the contact cells at the edge of the contact and at the edge of the material, and numbers of faces.
+
+    The faces are those to free cells, those at the edge of the material, and those of the last to absent cells. The
+    others lie at the border of the grid, whose place is known.
+    """
+    at_edge, at_end = np.zeros_like(contact), np.zeros_like(contact)
+    faces, ends, outline = 0, 0, 0
+    around = (neighbours(mask, boundary) for mask in (present & ~contact, present, ~present))
+    for free, material, absent in zip(*around, strict=True):
+        at_edge |= contact & free
         at_end |= contact & ~material
+        faces += int(np.count_nonzero(contact & free))
         ends += int(np.count_nonzero(contact & ~material))
-    return at_edge, at_end, faces, ends
+        outline += int(np.count_nonzero(contact & absent))
+    return at_edge, at_end, faces, ends, outline
 
 
 # ------------------------------------------------------------------------------------------------------ coarser grids

@@ -17,7 +17,15 @@ from roughvisc.arguments import one_of
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.experiment.accuracy import border_warning, loaded_depth, slope_warning, stands_alone, wake_warning
 from roughvisc.experiment.base import Experiment, Row, Rows
-from roughvisc.experiment.grid_error import coarser_shape, counting_error, grid_errors, grid_uncertainty, hidden_opening
+from roughvisc.experiment.grid_error import (
+    coarser_shape,
+    counting_error,
+    grid_errors,
+    grid_uncertainty,
+    hidden_opening,
+    hidden_peak,
+    missing_of_zero,
+)
 from roughvisc.experiment.profile import Profile
 from roughvisc.experiment.resources import curve_bytes, require_memory
 from roughvisc.mechanics.body import Body
@@ -47,7 +55,9 @@ _QUANTITIES = ("friction_force", "contact_area", "approach", "mean_gap")
 #: a contact at rest the ratio was below 0.8 in 15 of these 216 cases.
 _COUNTING_CAUTION = 1.5
 #: The friction force from the slope is meaningful if it differs from the force from the power by at most this fraction.
-#: At low speed on a rough surface it is the difference of two large forces.
+#: At low speed on a rough surface it is the difference of two large forces. Then the error is at least that of an area
+#: whose edge lies anywhere in its cells: of 526 rows of line contacts 0.6 % state less than half of the true error of
+#: friction, 2.3 % without this term.
 _MEANINGFUL = 0.1
 _MORE_INSTANTANEOUS = "a material with more instantaneous compliance"
 
@@ -285,9 +295,10 @@ def sliding_grid_errors(
     Returns
     -------
     dict
-        Name of a variable -> error; NaN without friction, or without a coarser grid.
+        Name of a variable -> error. NaN without friction, or without a coarser grid. The error of friction is NaN if no
+        contact is three cells wide along the motion, the error of the gap if the gap is zero and may be open.
     """
-    grid, (friction, *_, wide) = grids[0], runs[0]
+    grid, (friction, _, deep, wide) = grids[0], runs[0]
     if len(grids) == 1 or friction <= 0:
         return {GRID_ERROR[name]: math.nan for name in _QUANTITIES}
     ratio = max(many / few for many, few in zip(grid.gap.shape, grids[1].gap.shape, strict=True))
@@ -299,14 +310,24 @@ def sliding_grid_errors(
     contact = pressure > 0
     hidden_area, hidden_gap = hidden_opening(pressure, -grid.gap, True)
     *_, faces = contact_area(contact, ~contact, 1.0, "periodic")
-    counting = _COUNTING_CAUTION * counting_error(contact, faces)
+    counting = counting_error(contact, faces)
     # Friction from pressure times slope of the profile. The surface follows the profile at the centres of the contact
     # cells but not at the edges of contact; this is an error of the grid.
     inclined = float(np.sum(pressure * slope(grid.gap, grid.spacing[0], 0))) * grid.spacing[0] * grid.spacing[1]
     apart = abs(inclined / friction - 1)
     least = {
-        "friction_force": apart if apart <= _MEANINGFUL else 0.0,
-        "contact_area": max(hidden_area, counting),
-        "mean_gap": hidden_gap / (max(wide, hidden_gap) or 1.0),
+        "friction_force": apart if apart <= _MEANINGFUL else counting,
+        "contact_area": max(hidden_area, _COUNTING_CAUTION * counting),
+        "approach": hidden_peak(-grid.gap, True) / max(abs(deep), 1e-300),
+        "mean_gap": hidden_gap / max(wide, 1e-300),
     }
-    return {name: float(error) for name, error in grid_errors(errors, least).items()}
+    if not _is_resolved(contact):
+        errors["friction_force"] = np.float64(math.nan)
+    found = grid_errors(errors, least)
+    found[GRID_ERROR["mean_gap"]] = missing_of_zero(found[GRID_ERROR["mean_gap"]], wide)
+    return {name: float(error) for name, error in found.items()}
+
+
+def _is_resolved(contact: NDArray[np.bool_]) -> bool:
+    """Return whether any contact is three cells wide along the motion; the surface repeats."""
+    return bool((contact & np.roll(contact, 1, axis=0) & np.roll(contact, -1, axis=0)).any())

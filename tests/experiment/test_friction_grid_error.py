@@ -14,7 +14,7 @@ NOISE = 5e-4
 
 
 def judged(scan, fine, pressure):
-    """Stated and true errors of friction, of area, and of the mean gap."""
+    """Stated and true errors of friction, of area, of the mean gap and of the approach."""
     asked = {"pressure": pressure, "speeds": SPEEDS, "tolerance": 1e-4, "progress": False}
     found, exact = rv.friction(scan, RUBBER, **asked, grid_error=True), rv.friction(fine, RUBBER, **asked)
     true = abs(found / exact - 1)
@@ -22,6 +22,7 @@ def judged(scan, fine, pressure):
         (found.grid_error_friction.values, true.friction_coefficient.values),
         (found.grid_error_area.values, true.contact_area.values),
         (found.grid_error_gap.values, true.mean_gap.values),
+        (found.grid_error_approach.values, true.approach.values),
     )
 
 
@@ -55,6 +56,32 @@ def test_grid_error__bounds_the_true_one_of_slow_sliding(ratio, pressure, cells)
     found = rubbed(cells, grid_error=True)
     true = abs(float(found.friction_coefficient[0] / rubbed(2048).friction_coefficient[0]) - 1)
     assert 0.7 * true < float(found.grid_error_friction[0]) < 0.1
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.3])
+def test_grid_error__of_the_approach_holds_the_crest_between_cells(phase):
+    """Under a light load, also if the crest lies where the period ends."""
+
+    def pressed(cells, **more):
+        x = (np.arange(cells) + 0.5) / cells
+        wave = rv.from_array(1e-6 * np.cos(2 * np.pi * (x - phase))[:, None] * np.ones((1, 2)), 1e-3 / cells)
+        return rv.friction(wave, RUBBER, pressure=50.0, speeds=10.0, tolerance=1e-4, progress=False, **more)
+
+    found = pressed(42, grid_error=True)
+    off = abs(float(pressed(420, grid_error=False).approach[0] / found.approach[0]) - 1)
+    assert 0.02 < off < float(found.grid_error_approach[0])
+
+
+def test_grid_error__of_friction_is_not_known_below_three_cells():
+    wave = rv.wavy(1e-6, 1e-3, (1e-3, 1e-4), (40, 4), waves=1)
+    few, many = (
+        rv.friction(wave, RUBBER, pressure=pressure, speeds=0.1, grid_error=True, progress=False)
+        for pressure in (3.0, 300.0)
+    )
+    assert float(few.contact_fraction[0]) < 3 / 40 < float(many.contact_fraction[0])
+    assert np.isnan(few.grid_error_friction).all()
+    assert float(few.grid_error_area[0]) > 0.1
+    assert float(many.grid_error_friction[0]) > 0
 
 
 def test_grid_error__is_not_known_without_friction_or_without_a_coarser_grid():

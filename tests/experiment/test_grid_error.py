@@ -51,6 +51,17 @@ def test_grid_error__of_a_punch_holds_what_its_cells_are_short_of_a_circle(contr
         assert 0.003 < abs(float(ds.force[0]) / LOAD - 1) < float(ds.grid_error[0])
 
 
+def test_grid_error__of_the_area_of_a_punch_holds_its_outline_in_cells():
+    """Of 16 cells in a circle of 19.6, as on the coarser grid; a plate that fills its grid has no such error."""
+    settings = {"grid_error": True, "progress": False, "boundary": "free"}
+    press = rv.Program().load(LOAD, over=0)
+    ds = rv.simulate(rv.flat_punch(2.5e-3, 8e-3, 8), rv.elastic(1e6), press, missing="absent", **settings)
+    off = abs(float(ds.contact_area[0]) / (np.pi * 2.5e-3**2) - 1)
+    assert 0.1 < off < float(ds.grid_error_area[0]) < 0.5
+    plate = rv.from_array(np.zeros((7, 7)), 1e-3)
+    assert float(rv.simulate(plate, rv.elastic(1e6), press, edge="accept", **settings).grid_error_area[0]) < 1e-12
+
+
 def test_grid_error__of_the_gap_of_a_rough_surface_is_small():
     """Against cells a third as long, with the same waves: far below that of the approach, which hangs on the peak."""
     made = {"hurst": 0.8, "rms_slope": 0.1, "shortcut": 2e-4, "rolloff": 5e-4, "seed": 4}
@@ -125,5 +136,7 @@ def test_grid_error__holds_an_opening_that_full_contact_hides(cells, offset, alo
     closed = 2 / np.pi * np.arcsin(np.sqrt(0.999))
     assert float(nearly.contact_fraction[0]) == 1.0
     assert 1 - closed <= float(nearly.grid_error_area[0]) <= 5 * (1 - closed)
-    assert float(nearly.grid_error_gap[0]) > 0
+    assert float(nearly.mean_gap[0]) == 0
+    assert np.isnan(nearly.grid_error_gap).all(), "a gap of zero has no relative error"
+    assert float(well.grid_error_gap[0]) == 0
     assert float(well.grid_error_area[0]) < 1e-6
