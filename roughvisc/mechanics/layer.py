@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel, cell_mean, check_one_body, corner_sum
 from roughvisc.mechanics.materials.creep import Material, Prony
-from roughvisc.mechanics.materials.series import laplace_compliance, lattice, nonnegative, over_frequencies
+from roughvisc.mechanics.materials.series import lattice, nonnegative, over_frequencies
 from roughvisc.units import Quantity, format_quantity, number, quantities
 
 Array = NDArray[np.float64]
@@ -399,7 +399,7 @@ class LayeredBody(Body):
         """Return the kernel of a half-space [m], and the effective contact compliance of each wave. [1/Pa]"""
         q = np.hypot(qx, qy)
         with np.errstate(divide="ignore", invalid="ignore"):  # at zero frequency
-            shear = np.array([laplace_compliance(one, 1j * frequency) for one in self.materials])
+            shear = np.array([one.laplace(1j * frequency) for one in self.materials])
         flows = ~np.isfinite(shear).all(axis=0)
         shear[:, flows] = 1.0
         found = effective_compliance(np.where(q > 0, q, 1.0), self.thicknesses, self.poissons, list(shear))
@@ -428,7 +428,7 @@ class LayeredBody(Body):
         z = count * (-0.4814 + 0.6122 * angle * cotangent + 0.2645j * angle)
         slope = 0.6122 * cotangent - 0.6122 * 0.6407 * angle / sine**2 + 0.2645j
         weights = 2 * np.exp(z) * slope / z
-        shear = [laplace_compliance(one, z / t[:, None]) for one in self.materials]
+        shear = [one.laplace(z / t[:, None]) for one in self.materials]
         found = effective_compliance(q[:, None, None], self.thicknesses, self.poissons, shear)
         return np.asarray((found @ weights).imag)
 
@@ -440,7 +440,7 @@ class LayeredBody(Body):
         """
         place = lattice(shortest, longest, 100)
         with np.errstate(divide="ignore"):  # at a retardation time of the material
-            signs = np.sign([laplace_compliance(one, -1 / place) for one in self.materials])
+            signs = np.sign([one.laplace(-1 / place) for one in self.materials])
         apart = scipy.ndimage.binary_dilation((signs != signs[0]).any(axis=0))
         found = {min(max(time, shortest), longest) for one in self.materials for time in one.times}
         for (part,) in scipy.ndimage.find_objects(scipy.ndimage.label(apart)[0]):

@@ -82,9 +82,10 @@ class SteadyState:
     pressure : array, shape (nx, ny)
         Pressure, exactly zero out of contact, whose integral is the load. [Pa]
     displacement : array, shape (nx, ny)
-        Displacement; its mean is zero on a half-space. [m]
+        Displacement; its mean is zero on a half-space, and on any body that uniform pressure compresses without end.
+        [m]
     approach : float
-        Approach. [m]
+        Approach, without the mean displacement where that is left out. [m]
     power_force : float
         Friction force: dissipated power over the speed. [N]
     residual : float
@@ -120,6 +121,11 @@ class Sliding:
     InputError
         If the material creeps without end and the grid has waves across the motion. These waves do not move in the
         body, so that a steady state does not exist.
+
+    Notes
+    -----
+    If uniform pressure compresses the body without end, as on a compressible sheet of a material that creeps without
+    end, the mean displacement is left out like on a half-space.
     """
 
     def __init__(
@@ -130,8 +136,11 @@ class Sliding:
         self.qx, self.qy = 2 * math.pi * fft.fftfreq(nx, dx)[:, None], 2 * math.pi * fft.rfftfreq(ny, dy)[None, :]
         response, complex_compliance = body.waves(self.qx, self.qy, -self.qx * speed)
         complex_compliance = np.where(response > 0, complex_compliance, 0.0)
+        if not np.isfinite(complex_compliance[0, 0]):  # uniform pressure compresses the body without end
+            complex_compliance[0, 0] = 0.0
         if not np.isfinite(complex_compliance).all():  # of waves across the motion, which do not move in the material
-            expected = "a solid, because this material creeps without end, or a profile uniform across the motion"
+            solid = "a solid, because this material creeps without end or to a compliance that is not known"
+            expected = f"{solid}, or a profile uniform across the motion"
             raise InputError(key="material", found=body.materials, expected=expected)
         skew = 1j * (complex_compliance.imag * response)
         across = self.qy.copy()

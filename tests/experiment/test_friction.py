@@ -97,7 +97,7 @@ ZENER, ROWS = rv.zener(1e6, 1e6, 1e3), np.append(0.0, np.geomspace(1e-6, 1.0, 12
 
 @pytest.mark.parametrize("direction", ["x", "-y"])
 @pytest.mark.parametrize(
-    ("material", "equal", "tolerance"),
+    ("body", "equal", "tolerance"),
     [
         (rv.maxwell(1e6, 1e3), None, 1e-5),
         (rv.power_law(1e-7, 1e-6, 0.3), None, 1e-5),
@@ -105,19 +105,22 @@ ZENER, ROWS = rv.zener(1e6, 1e6, 1e3), np.append(0.0, np.geomspace(1e-6, 1.0, 12
         (rv.creep(lambda t: ZENER.creep_compliance(t)), ZENER, 1e-3),
         (rv.creep_table(ROWS, ZENER.creep_compliance(ROWS)), ZENER, 1e-3),
         (rv.sheet(ZENER, 1.0), ZENER, 1e-5),
+        (rv.sheet(rv.power_law(1e-7, 1e-6, 0.3, poisson=0.3), 2e-4), None, 1e-5),
     ],
-    ids=["maxwell", "power law", "pair", "own", "table", "deep sheet"],
+    ids=["maxwell", "power law", "pair", "own", "table", "deep sheet", "compressible sheet"],
 )
-def test_wave_in_full_contact__slides_with_the_loss_of_any_material(material, equal, tolerance, direction):
+def test_wave_in_full_contact__slides_with_the_loss_of_any_material(body, equal, tolerance, direction):
     """Full contact of a wave has mu = k^2 A^2 Im E*(k V) / (4 p0), on any number of rows."""
     side, shape, amplitude, speed, k = 1e-3, (21, 5), 1e-7, 0.1, 2 * np.pi / 1e-3
     wave = rv.wavy(amplitude, side, (side, side / 7), shape, waves=1)
     if direction == "-y":
         wave = wave.transpose().rename(x="y", y="x")
-    modulus = 1 / complex(complex_compliance(equal or material, k * speed))
+    softness = float(body.kernel.transfer(k, 0.0)) if hasattr(body, "kernel") else 2 / k
+    material = equal or getattr(body, "material", body)
+    modulus = 2 / k / softness / complex(complex_compliance(material, k * speed))
     pressure = 3 * amplitude * k * abs(modulus)
     settings = {"direction": direction, "fields": ("pressure",), "tolerance": 1e-6, "progress": False}
-    ds = rv.friction(wave, material, pressure=pressure, speeds=speed, **settings)
+    ds = rv.friction(wave, body, pressure=pressure, speeds=speed, **settings)
     exact = k**2 * amplitude**2 * modulus.imag / (4 * pressure)
     assert float(ds.friction_coefficient[0]) == pytest.approx(exact, rel=tolerance)
     assert float(ds.pressure[0].mean()) == pytest.approx(pressure, rel=1e-9)
@@ -133,6 +136,26 @@ def test_flat_surface__sinks_uniformly_and_slides_freely():
     assert float(found.approach[0]) == pytest.approx(sunk, rel=1e-9)
     assert float(found.friction_force[0]) == 0
     assert float(found.contact_fraction[0]) == 1
+
+
+@pytest.mark.parametrize("slowest", [40.0, 1e6])
+def test_own_solid__slides_like_its_series(slowest):
+    """Waves across the motion have the compliance after endless creep, however late that is."""
+    series = rv.Prony(1e-7, 0.0, (4e-7, 4e-7), (1e-3, slowest))
+    press = {"pressure": 2e4, "speeds": [1e-3, 0.1, 10.0], "grid_error": False, "progress": False}
+    exact, found = (
+        rv.friction(ROUGH, body, **press)
+        for body in (rv.pair(series, rv.elastic(1e8)), rv.pair(rv.creep(series.creep_compliance), rv.elastic(1e8)))
+    )
+    np.testing.assert_allclose(found.friction_coefficient, exact.friction_coefficient, rtol=2e-3)
+
+
+def test_own_fluid__is_refused_and_has_no_transform():
+    glass = rv.creep(lambda t: 1e-7 * (1 + 0.2 * np.log1p(t / 1e-3)))
+    with refused("material"):
+        rv.friction(ROUGH, glass, **PRESS)
+    with refused("material", glass):
+        glass.laplace(np.array([1.0]))
 
 
 def test_unsolved_speed__is_named(monkeypatch):

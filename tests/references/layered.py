@@ -11,7 +11,6 @@ from scipy.optimize import brentq
 from references.dense import settled
 from references.half_space import pressure_of_springs
 from roughvisc.mechanics.layer import effective_compliance
-from roughvisc.mechanics.materials.series import laplace_compliance
 from roughvisc.mechanics.sheet import factors
 
 # ----------------------------------------------------------------------------------------------------------- waves
@@ -59,7 +58,7 @@ def elastic_factor(x, poissons, moduli, base=None):
 
 def layered_compliance(q, s, layer, base, thickness):
     """Displacement over pressure of a wave that grows as ``exp(s t)``. [m/Pa]"""
-    shear = [laplace_compliance(one, np.asarray(s, dtype=complex)) for one in (layer, base)]
+    shear = [one.laplace(np.asarray(s, dtype=complex)) for one in (layer, base)]
     return 2 / q * effective_compliance(q, (thickness,), (layer.poisson, base.poisson), shear)
 
 

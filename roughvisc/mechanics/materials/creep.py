@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 
 #: Largest shift factor; its inverse is the smallest. Factors beyond result from a temperature in a wrong unit.
 LARGEST_SHIFT = 1e30
+#: Largest relative growth of a creep compliance that has settled.
+_SETTLED = 1e-9
 #: Decimal logarithm of the largest factor of WLF and Arrhenius.
 _LARGEST = 300.0
 
@@ -115,6 +117,29 @@ class Prony:
         t = known_times(t, self.longest)
         crept = np.add.reduce(self.compliances * parts_of_step(t[..., None] / np.array(self.times))[1], axis=-1) * t
         return np.asarray(0.5 * (1 - self.poisson) * (self.glassy * t + self.fluidity * t**2 / 2 + crept))
+
+    @property
+    def final_compliance(self) -> float:
+        """Shear compliance after endless creep, infinite for a fluid. [1/Pa]"""
+        return math.inf if self.fluidity else self.glassy + sum(self.compliances)
+
+    def laplace(self, s: NDArray[Any]) -> NDArray[Any]:
+        """Return the shear compliance under a pressure that grows as ``exp(s t)``. [1/Pa]
+
+        Parameters
+        ----------
+        s : ndarray
+            Real or complex rates. [1/s]
+
+        Returns
+        -------
+        ndarray
+            ``s`` times the Laplace transform of ``J(t)``. [1/Pa]
+        """
+        found = self.glassy + (self.fluidity / s if self.fluidity else 0 * s)
+        for compliance, time in zip(self.compliances, self.times, strict=True):
+            found = found + compliance / (1 + s * time)
+        return np.asarray(found)
 
     def scaled(self, time_factor: float, modulus_factor: float, note: str = "") -> Prony:
         """Return the series with all times multiplied by one factor and all moduli by another."""
@@ -211,6 +236,54 @@ class Creep:
         t = np.asarray(t, dtype=float)
         return np.asarray(t * (self.contact_compliance(t[..., None] * np.exp(-y)) @ (weights * np.exp(-y))))
 
+    @property
+    def final_compliance(self) -> float:
+        """Shear compliance after endless creep, infinite if it is not bounded or not known. [1/Pa]
+
+        A function that is not defined at an infinite time is bounded if it does not grow from ``1e15 s`` to ``1e18 s``.
+        """
+        with np.errstate(all="ignore"):
+            try:
+                late = self.creep_compliance(np.array([1e15 * self.time_factor, 1e18 * self.time_factor, math.inf]))
+            except (ValueError, ArithmeticError):  # of a function that is defined up to some time
+                return math.inf
+        if not np.isnan(late[-1]):
+            return float(late[-1])
+        return float(late[1]) if abs(late[1] - late[0]) <= _SETTLED * late[1] < math.inf else math.inf
+
+    @property
+    def has_laplace(self) -> bool:
+        """Whether :meth:`laplace` is known."""
+        if self.function is pair_creep:
+            return all(not isinstance(body, Creep) or body.has_laplace for body in self.parameters)
+        return self.function is power_creep
+
+    def laplace(self, s: NDArray[Any]) -> NDArray[Any]:
+        """Return the shear compliance of a power law or a pair under a pressure that grows as ``exp(s t)``. [1/Pa]
+
+        Parameters
+        ----------
+        s : ndarray
+            Real or complex rates. [1/s]
+
+        Returns
+        -------
+        ndarray
+            ``s`` times the Laplace transform of ``J(t)``. [1/Pa]
+
+        Raises
+        ------
+        InputError
+            If the function is another one: its transform is not known.
+        """
+        if not self.has_laplace:
+            raise InputError(key="material", found=self, expected="a series or a power law, with a known transform")
+        if self.function is pair_creep:
+            return np.asarray(sum(2 * (1 - body.poisson) * body.laplace(s) for body in self.parameters))
+        glassy, coefficient, exponent, time_scale = self.parameters
+        crept = coefficient * math.gamma(1 + exponent) * (s * (self.time_factor * time_scale)) ** -exponent
+        return np.asarray((glassy + crept) / self.modulus_factor)
+
     def scaled(self, time_factor: float, modulus_factor: float, note: str = "") -> Material:
         """Return the material with all times multiplied by one factor and all moduli by another."""
         note = "; ".join(filter(None, (self.note, note)))
@@ -231,7 +304,8 @@ def creep(function: Callable[[Array], Any], poisson: float = 0.5) -> Creep:
     Parameters
     ----------
     function : callable
-        ``J(t)``, [1/Pa], for an array of times from zero on [s]. It must not decrease.
+        ``J(t)``, [1/Pa], for an array of times from zero on [s]. It must not decrease. Steady sliding also evaluates it
+        at an infinite time: a finite value makes the material a solid with this compliance after endless creep.
     poisson : float
         Poisson ratio, constant in time.
 

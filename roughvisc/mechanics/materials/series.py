@@ -14,14 +14,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 import scipy  # which imports a submodule when it is first used: scipy.optimize takes 0.2 s
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.creep import Creep, Material, Prony, pair, pair_creep, power_creep
+from roughvisc.mechanics.materials.creep import Creep, Material, Prony, pair, pair_creep
 
 Array = NDArray[np.float64]
 
@@ -34,6 +34,10 @@ _OFFERED, _MOST_OFFERED = (0.5, 0.7, 1, 1.5, 2, 3, 4, 6, 8, 12, 24, 48), 300
 #: Shortest time over the shortest retardation time, two values to try: the larger one gives a better fit before the
 #: shortest time, with more terms. Longest retardation time over the longest time.
 _FASTER, _SLOWER = (3.0, 10.0), 3.0
+#: Retardation times of a solid that creeps on after the longest time, over its slowest other retardation time.
+_SLOW = 10.0 ** np.arange(1, 13)
+#: Fluidity of a material that creeps without end, if its series has none: without influence on oscillating waves.
+_FLOWS = 1e-300
 #: Number of times that the rows are reweighted to level the error.
 _LEVELLINGS = 6
 #: Number of successive trials without a smaller error after which the fit ends.
@@ -75,7 +79,9 @@ def check_creep(material: Material, times: Array) -> Array:
     return values[1:]
 
 
-def series(material: Material, shortest: float, longest: float, tolerance: float) -> tuple[Prony, float]:
+def series(
+    material: Material, shortest: float, longest: float, tolerance: float, *, until_end: bool = False
+) -> tuple[Prony, float]:
     r"""Fit a Prony series to a material for a range of times.
 
     Parameters
@@ -87,6 +93,9 @@ def series(material: Material, shortest: float, longest: float, tolerance: float
         Range of times. [s]
     tolerance : float
         Largest relative error allowed.
+    until_end : bool
+        Whether the compliance after endless creep matters, as it does for waves that stand still. The series of a
+        material with bounded creep then has that compliance, and no fluidity.
 
     Returns
     -------
@@ -115,6 +124,8 @@ def series(material: Material, shortest: float, longest: float, tolerance: float
         return material, 0.0
     instants = _instants(shortest, longest, _MEASURED)
     compliance = check_creep(material, instants)
+    if until_end and math.isfinite(material.final_compliance):
+        instants, compliance = np.append(instants, math.inf), np.append(compliance, material.final_compliance)
     if isinstance(material, Creep) and material.function is pair_creep:
         joined = cast(Prony, pair(*(series(one, shortest, longest, tolerance)[0] for one in material.parameters)))
         return joined, _error(joined, instants, compliance)
@@ -126,17 +137,27 @@ def series(material: Material, shortest: float, longest: float, tolerance: float
 
 
 def _fits(material: Material, instants: Array, compliance: Array, tolerance: float) -> Iterator[tuple[float, Prony]]:
-    """Yield errors and series, from ever denser lattices of retardation times."""
-    shortest, longest = instants[0], instants[-1]
+    """Yield errors and series, from ever denser lattices of retardation times.
+
+    If the last instant is infinite, the series has the last compliance after endless creep. Terms slower than all
+    other instants then replace the fluidity.
+    """
+    is_bounded = math.isinf(instants[-1])
+    shortest, longest = instants[0], instants[-1 - is_bounded]
     glassy, t = float(material.creep_compliance(0.0)), _instants(shortest, longest, _FITTED)
     exact = material.creep_compliance(t)
+    if is_bounded:
+        t, exact = np.append(t, math.inf), np.append(exact, compliance[-1])
+    slow = longest * _SLOWER * _SLOW if is_bounded else np.zeros(0)
     for faster in _FASTER:
         idle, reached = 0, math.inf
         for per_decade in _OFFERED:
             times = lattice(shortest / faster, longest * _SLOWER, per_decade)
             if idle == _IDLE or reached <= tolerance or times.size > _MOST_OFFERED:
                 break
-            columns = np.column_stack([t / longest, -np.expm1(-t[:, None] / times)])
+            times = np.append(times, slow)
+            flowing = np.zeros_like(t) if is_bounded else t / longest
+            columns = np.column_stack([flowing, -np.expm1(-t[:, None] / times)])
             before, importance = reached, np.ones(t.size)
             for _ in range(_LEVELLINGS):
                 weights = nonnegative(columns, exact - glassy, exact / importance)
@@ -240,33 +261,8 @@ def complex_compliance(material: Material, frequency: ArrayLike) -> NDArray[np.c
     if isinstance(material, Creep) and material.function is pair_creep:
         return np.asarray(sum(complex_compliance(one, w) for one in material.parameters))
     with np.errstate(divide="ignore", invalid="ignore"):  # at zero frequency
-        found = 0.5 * (1 - material.poisson) * laplace_compliance(material, 1j * w)
+        found = 0.5 * (1 - material.poisson) * material.laplace(1j * w)
     return np.where(np.isfinite(found), found, complex(math.inf, 0.0))
-
-
-def laplace_compliance(material: Material, s: NDArray[Any]) -> NDArray[Any]:
-    """Return the shear compliance of a series or a power law under a pressure that grows as ``exp(s t)``.
-
-    Parameters
-    ----------
-    material : Material
-        Series, or power law.
-    s : ndarray
-        Real or complex rates. [1/s]
-
-    Returns
-    -------
-    ndarray
-        Shear compliance: ``s`` times the Laplace transform of ``J(t)``. [1/Pa]
-    """
-    if isinstance(material, Creep):
-        glassy, coefficient, exponent, time_scale = material.parameters
-        crept = coefficient * math.gamma(1 + exponent) * (s * (material.time_factor * time_scale)) ** -exponent
-        return np.asarray((glassy + crept) / material.modulus_factor)
-    found = material.glassy + (material.fluidity / s if material.fluidity else 0 * s)
-    for compliance, time in zip(material.compliances, material.times, strict=True):
-        found = found + compliance / (1 + s * time)
-    return np.asarray(found)
 
 
 def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float = 1e-4) -> Material:
@@ -289,11 +285,12 @@ def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float 
     """
     if isinstance(material, Creep) and material.function is pair_creep:
         return pair(*(over_frequencies(one, frequency, tolerance) for one in material.parameters))
-    if material.longest == math.inf if isinstance(material, Prony) else material.function is power_creep:
+    if material.longest == math.inf if isinstance(material, Prony) else material.has_laplace:
         return material
     size = np.abs(np.asarray(frequency, dtype=float))
     shortest, longest = 1 / (_BEYOND * float(size.max())), _BEYOND / float(size[size > 0].min())
     if isinstance(material, Creep):
-        return series(material, shortest, longest, tolerance)[0]
+        found, _ = series(material, shortest, longest, tolerance, until_end=True)
+        return found if math.isfinite(material.final_compliance) else replace(found, fluidity=found.fluidity or _FLOWS)
     material.creep_compliance(longest)  # refuses a table that ends earlier
     return replace(material, longest=math.inf)
