@@ -38,6 +38,10 @@ _SHORT, _DECADES = 15.0, 9
 # Numbers of waves per decade at which a series is computed: the first whose interpolant is accurate enough is used.
 # Error of the interpolant, as a fraction of the tolerance.
 _WAVES_PER_DECADE, _INTERPOLATED = (10, 14, 20, 30, 45), 0.2
+# Compliances of waves below this part of the largest one are compared with that part: on a base that is almost rigid
+# the compliance of long waves is rounding. In free space the images fit compliances below the second part with the
+# error of that part. Relative to smaller compliances the fit loses all digits.
+_STIFF, _FAR = 1e-9, 1e-6
 # Retardation times per decade to try in a fit, and factor by which their range exceeds the range of ages.
 _OFFERED, _BEYOND = (0, 1, 1.5, 2, 3, 4, 5, 6, 8, 10, 12, 14, 17, 20, 24, 28, 34, 40, 48, 57, 68), 10.0
 # Depths of images per decade, from this part of the thinnest layer's thickness on. The response of elastic layers is
@@ -246,8 +250,8 @@ class LayerSeries:
         """Return the kernel of the weighted sum of the terms, of which the instantaneous compliance is the last."""
         scale = crept(self.times, self.duration) @ self.compliances
         if not weights[:-1].any():  # the instantaneous compliance may be far below the final one, or vanish
-            scale = np.maximum(self.compliances[-1], 1e-6 * (scale if self.times else scale.max()))
-        scale = scale if scale.any() else np.ones_like(scale)
+            scale = np.maximum(self.compliances[-1], _FAR * (scale if self.times else scale.max()))
+        scale = np.maximum(scale, _FAR * scale.max()) if scale.any() else np.ones_like(scale)
         return LayerKernel(tuple(self.q), tuple(weights @ self.compliances), tuple(scale))
 
     def fastest_wave(self, longest: float, shortest: float) -> Prony:
@@ -313,7 +317,10 @@ def layer_series(body: LayeredBody, shortest: float, duration: float, tolerance:
         found = replace(best, times=tuple(times[used]), compliances=np.vstack([weights[:, used].T, at_once]))
         course = crept(found.times, t)
         of_waves = (found.compliances, exact), (interpolated(between, q, found.compliances), expected)
-        error = max(float(np.abs((course @ one).T / known - 1).max()) for one, known in of_waves)
+        error = max(
+            float((np.abs((course @ one).T - known) / np.maximum(known, _STIFF * known.max())).max())
+            for one, known in of_waves
+        )
         best = replace(found, error=error) if error < best.error else best
         if error <= tolerance:
             break
@@ -335,7 +342,7 @@ def _known_waves(body: LayeredBody, t: Array, tolerance: float) -> tuple[Array, 
         q = lattice(longest, _SHORT / thinnest, per_decade)
         between = np.asarray(np.sqrt(q[1:] * q[:-1]), dtype=np.float64)
         expected = known(between)
-        scale = np.maximum(np.abs(expected), 1e-12 * expected.max(axis=1, keepdims=True) + 1e-300)
+        scale = np.maximum(np.abs(expected), _STIFF * expected.max(axis=1, keepdims=True) + 1e-300)
         scale[0] = scale[:2].max(axis=0)  # next to zero: of long waves on a rigid base
         error = float((np.abs(interpolated(between, q, known(q)) - expected) / scale).max())
         if error <= _INTERPOLATED * tolerance:

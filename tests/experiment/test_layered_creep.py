@@ -89,6 +89,16 @@ def test_ball__is_that_on_elastic_layers_at_once_and_in_the_end():
         assert float(abs(ds.pressure[row] - exact.pressure[0]).sum() / exact.pressure[0].sum()) < 4e-3
 
 
+def test_layer_on_an_almost_rigid_base__is_a_bonded_sheet():
+    """The compliances of waves span ten decades."""
+    gel, ball = rv.kelvin_voigt(5e5, 2e4, poisson=0.45), rv.sphere(3e-5, 1.5e-5, 15)
+    bodies = rv.sheet(gel, 2.5e-6), rv.layer(gel, 2.5e-6, on=rv.elastic(1e16, 0.3))
+    settings = {"times": 1, "tolerance": 1e-2, "grid_error": False, "progress": False}
+    sheet, layer = (rv.simulate(ball, body, rv.Program().load(3e-7, over=0.1), **settings).pressure for body in bodies)
+    assert sheet.shape == layer.shape
+    assert float(abs(layer - sheet).sum() / sheet.sum()) < 1e-4
+
+
 #: They creep in 1 ms, and in 2 ms: over a fifth of the surface, and over two fifths.
 QUICK, SLOW, SPEED = rv.zener(1e6, 3e5, 3e2), rv.zener(8e6, 2e6, 4e3, 0.35), 0.2
 
