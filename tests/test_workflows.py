@@ -117,6 +117,14 @@ def test_accuracy__of_random_cases_is_judged(tmp_path, script):
     assert late["status"].startswith("run: TimeoutError"), "reported, not dropped"
 
 
+def test_closed_forms__are_within_what_rows_state(script):
+    rates = script("closed_forms").main(["friction", "channels"], scenes=4, seed=1)
+    assert rates["friction"]["rows"] == 72
+    for kind in rates:
+        assert rates[kind]["bad"] == 0
+        assert 1 <= rates[kind]["stated/true"] < 10
+
+
 @pytest.mark.thorough
 def test_grid_accuracy__is_what_the_docs_say(script):
     for row in script("grid_accuracy").main(small=True):
