@@ -318,7 +318,7 @@ def layer_series(body: LayeredBody, shortest: float, duration: float, tolerance:
         course = crept(found.times, t)
         of_waves = (found.compliances, exact), (interpolated(between, q, found.compliances), expected)
         error = max(
-            float((np.abs((course @ one).T - known) / np.maximum(known, _STIFF * known.max())).max())
+            float((np.abs((course @ one).T / known - 1) * np.minimum(known / (_STIFF * known.max()), 1.0)).max())
             for one, known in of_waves
         )
         best = replace(found, error=error) if error < best.error else best

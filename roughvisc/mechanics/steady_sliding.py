@@ -57,9 +57,10 @@ _FORCING = 0.3
 _MANY, _STRICT, _CENTRED = 30, 1e-3, 0.5
 # Largest residual of GMRES over the right-hand side: in any step, and in the step that gives the stated error.
 _LOOSEST, _STATED = 0.5, 0.05
-# Stiffest over softest wave up to which the preconditioner computes in single precision. Measured on random profiles on
-# Kelvin-Voigt materials and on series with little instantaneous compliance: up to 1e4 the precision does not change the
-# number of convolutions. From 3e4 on single precision needs up to 1.5 times as many, and some problems do not converge.
+# Stiffest over softest wave up to which the preconditioner of a body with losses computes in single precision. Measured
+# on random profiles on Kelvin-Voigt materials and on series with little instantaneous compliance: up to 1e4 the
+# precision does not change the number of convolutions. From 3e4 on single precision needs up to 1.5 times as many, and
+# some problems do not converge.
 _SINGLE_PRECISION = 1e4
 # Part of the distance to the border of the feasible set that a step takes.
 _INSIDE = 0.995
@@ -153,7 +154,8 @@ class Sliding:
         # Pressure over displacement of each wave; waves without displacement count as the softest. [Pa/m]
         stiffness = 1 / np.where(displaced == 0, np.abs(displaced).max(), displaced)
         stiffest, softest = float(np.abs(stiffness).max()), float(np.abs(stiffness).min())
-        precision = np.complex64 if stiffest <= _SINGLE_PRECISION * softest else np.complex128
+        is_single = stiffest <= _SINGLE_PRECISION * softest or not skew.any()
+        precision = np.complex64 if is_single else np.complex128
         #: Displacement over pressure of each wave. [m/Pa]
         self.response = xp.asarray(displaced)
         self._skew = xp.asarray(skew)
