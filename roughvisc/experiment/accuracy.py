@@ -15,7 +15,9 @@ from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.solver import PERIMETER_CORRECTION
 from roughvisc.mechanics.memory import SERIES_SHARE, Memory, choose_memory
 from roughvisc.mechanics.program import Program
-from roughvisc.mechanics.stepping import SHORTEST_PAIR, Scene, Step
+from roughvisc.mechanics.scene import Scene
+from roughvisc.mechanics.step_control import SHORTEST_PAIR
+from roughvisc.mechanics.stepping import Step
 from roughvisc.settings import Settings, kept_times
 from roughvisc.topography.borders import JUMP, border_mismatch
 from roughvisc.topography.grid import squared_slopes
@@ -23,9 +25,9 @@ from roughvisc.topography.recipes import indenter_of, is_analytic
 from roughvisc.units import format_quantity
 
 Array = NDArray[np.float64]
-#: Errors inherited from the contact solver in earlier steps: of the pressure, over the tolerance, and of the approach.
-#: Measured on rows whose other errors are small.
-INHERITED, INHERITED_APPROACH = 0.02, 0.005
+#: Errors inherited from the contact solver in earlier steps, over its largest error so far: of the pressure, and of the
+#: approach.
+INHERITED, INHERITED_APPROACH = 0.25, 0.06
 #: Least stated error of the pressure of an elastic body, over the tolerance. Measured on the same rows.
 LEAST = 0.015
 #: Error of the work due to the contact solver, over its error of the pressure times the largest force and approach.
@@ -88,7 +90,7 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
     step, scene : Step, Scene
         An accepted step.
     series_error : float
-        Relative error of the series that represents the material.
+        Relative error of the series that represents the material, from its shortest known age on.
     largest : tuple of float
         Largest force [N] and approach [m] of the kept rows so far, to which errors are relative.
 
@@ -109,18 +111,24 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
     control = scene.program.segments[step.segment].control
     given, remembers = scene.program.prescribes[step.segment], not scene.memory.is_elastic
     largest_force, largest_approach = largest
-    loaded, reached = max(state.largest_force, point.force), max(state.largest_approach, abs(point.approach))
+    loaded = max(state.largest_force, point.force, 1e-300)
+    reached = max(state.largest_approach, abs(point.approach), 1e-300)
+    age = point.time - scene.program.corners[step.segment]
+    if age > 0 and scene.memory.early > 0:
+        change = (point.force - point.start) / loaded if control == "load" else (point.approach - point.start) / reached
+        part = 1.0 if age < scene.memory.shortest else min(abs(change), 1.0)
+        series_error += part * scene.memory.error_of_young(age)
     of_force = series_error * loaded
     unit = scene.tolerance if largest_force > 0 else 0.0
-    solved = point.solver_error + INHERITED * unit if remembers else max(point.solver_error, LEAST * unit)
-    work = scene.stated[0] * abs(state.work_apart) + state.work_curved
+    solved = point.solver_error + INHERITED * state.solver_error if remembers else max(point.solver_error, LEAST * unit)
+    work = abs(state.work_apart) + state.work_curved
     work += (OF_WORK * solved + series_error) * loaded * reached
     force = approach = 0.0
     if control == "approach" or not given:
         force = apart.force + solved * point.force + of_force
     if control == "load" or not given:
         approach = apart.approach + point.solver_error_approach + series_error * reached
-        approach += INHERITED_APPROACH * unit * reached if remembers else 0.0
+        approach += INHERITED_APPROACH * state.solver_error * reached if remembers else 0.0
     stepped = apart.pressure + apart.shared
     pressure = (stepped + solved * point.force + of_force) / largest_force if largest_force > 0 else solved
     per_force, per_approach = largest_force or math.inf, largest_approach or math.inf

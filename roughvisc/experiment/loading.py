@@ -31,7 +31,9 @@ from roughvisc.mechanics.contact.solver import contact_area
 from roughvisc.mechanics.grid import Grid, arrays_of, to_host
 from roughvisc.mechanics.memory import History
 from roughvisc.mechanics.program import Program
-from roughvisc.mechanics.stepping import SOFT, Difference, Packed, Point, Scene, State, Step, march
+from roughvisc.mechanics.scene import SOFT, Packed, Point, Scene
+from roughvisc.mechanics.stated_error import Difference
+from roughvisc.mechanics.stepping import State, Step, march
 from roughvisc.mechanics.tangential import tangential_force
 from roughvisc.settings import Problem, Settings, kept_times
 from roughvisc.topography.recipes import grown

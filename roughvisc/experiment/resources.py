@@ -17,7 +17,8 @@ from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.grid import LARGEST_REUSED, arrays_of
 from roughvisc.mechanics.memory import LayerMemory, Memory
 from roughvisc.mechanics.program import Program
-from roughvisc.mechanics.stepping import PACKED_FROM, SOFT
+from roughvisc.mechanics.scene import SOFT
+from roughvisc.mechanics.stepping import PACKED_FROM
 from roughvisc.settings import Settings
 from roughvisc.topography.grid import counts
 from roughvisc.units import format_quantity

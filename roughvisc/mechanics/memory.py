@@ -28,10 +28,11 @@ from functools import lru_cache
 from typing import Any, Literal, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from roughvisc.mechanics.body import Body, wave_limits
 from roughvisc.mechanics.grid import Grid, namespace
-from roughvisc.mechanics.layer import LayeredBody, LayerSeries, layer_series
+from roughvisc.mechanics.layer import LayeredBody, LayerSeries, crept, interpolated, layer_series
 from roughvisc.mechanics.materials.creep import Material, Prony, parts_of_step
 from roughvisc.mechanics.materials.series import series
 
@@ -136,7 +137,8 @@ class Memory:
         self.is_elastic = not bool(self.compliances.any())
         #: Rates at which errors of the history decay while the displacement is held [1/s], and their parts in an error
         #: that is equal in all modes. The modes decay together, because ``glassy v = -sum_i c_i m_i``.
-        self.rates, self.parts = np.zeros(1), np.ones(1)
+        #: Then the parts of the relaxation function that relax at these rates.
+        self.rates, self.parts, self.relaxing = np.zeros(1), np.ones(1), np.zeros(1)
         if self.glassy > 0 and not self.is_elastic:
             active = self.compliances > 0
             own, weights = 1 / self.times[active], self.compliances[active] / self.glassy
@@ -147,9 +149,12 @@ class Memory:
             rates, basis = np.linalg.eigh(np.diag(own) + np.outer(root, root))
             self.rates = np.maximum(rates, 0.0)
             self.parts = (root @ basis) * (basis.T @ (np.sqrt(weights / driven) * equal))
+            self.relaxing = (root @ basis) ** 2 / np.maximum(rates, 1e-300)
         #: Number of fields of a history.
         self.field_count = 2 if keeps_pressure else 1
         self.series_error, self.misfit, count = 0.0, 0.0, len(series.times)
+        #: Shortest age at which the error of the series is known [s], and error below it, see :func:`early_error`.
+        self.shortest, self.early = 0.0, 0.0
         terms = [f"{count} exponential{'s' * (count > 1)}"] * (count > 0) + ["a fluidity"] * (series.fluidity > 0)
         self.note = " and ".join(terms) or "no memory: elastic"
         self.may_ring = self.grows(duration, STIFF)
@@ -241,6 +246,48 @@ class Memory:
         left = (self.parts * np.exp(-self.rates * time)).sum() / self.parts.sum()
         return float(np.clip(left, 0.0, 1.0))
 
+    def grown_after(self, factor: float, longest: float) -> float:
+        """Return the time after which the compliance has grown by a factor, at most the longest time. [s]"""
+        if not self.grows(longest, factor):
+            return longest
+        rate = float((self.compliances / np.where(np.isinf(self.times), 1.0, self.times)).sum())
+        low, high = (factor - 1) * self.glassy / rate, longest  # the compliance is concave
+        while high > 1.05 * low:
+            middle = math.sqrt(low * high)
+            low, high = (low, middle) if self.grows(middle, factor) else (middle, high)
+        return low
+
+    def crept(self, time: ArrayLike) -> tuple[Any, Any]:
+        """Return the integral of the contact compliance from zero to some times, and its integral. [s/Pa, s2/Pa]"""
+        t = np.asarray(time, dtype=float)
+        flows = np.isinf(self.times)
+        first, second = integrals_of_retarded(t[..., None], np.where(flows, 1.0, self.times))
+        first = np.where(flows, t[..., None] ** 2 / 2, first)
+        second = np.where(flows, t[..., None] ** 3 / 6, second)
+        return self.glassy * t + first @ self.compliances, self.glassy * t**2 / 2 + second @ self.compliances
+
+    def relaxed(self, time: ArrayLike) -> tuple[Any, Any]:
+        """Return the integral of the relaxation function over its first value, and its integral. [s, s2]
+
+        A body without instantaneous compliance, or with layers that creep differently, has no such function here.
+        """
+        t = np.asarray(time, dtype=float)
+        relaxes = self.relaxing > 0
+        first, second = integrals_of_retarded(t[..., None], 1 / np.where(relaxes, self.rates, 1.0))
+        return t - first @ self.relaxing, t**2 / 2 - second @ self.relaxing
+
+    def error_of_young(self, age: float) -> float:
+        """Return the relative error of a displacement due to the ages at which the series is not known.
+
+        Parameters
+        ----------
+        age : float
+            Age of a pressure that has increased steadily since; positive. [s]
+        """
+        if self.early == 0:
+            return 0.0
+        return 1.0 if age < self.shortest else self.early * float(self.crept(self.shortest)[0] / self.crept(age)[0])
+
     def recursion(self, step: float, last: float, rule: Rule) -> tuple[np.ndarray, ...]:
         """Return the weights of ``m_new = own m + earlier m_before + before v + new v_new``.
 
@@ -295,7 +342,7 @@ class LayerMemory(Memory):
     def __init__(self, waves: LayerSeries, duration: float, grid: Grid | None) -> None:
         limits = (waves.q[0], waves.q[-1]) if grid is None else wave_limits(grid.period, grid.spacing)
         super().__init__(waves.fastest_wave(*limits), duration)
-        self.rates, self.parts = np.zeros(1), np.ones(1)  # a common rate of decay does not exist
+        self.rates, self.parts, self.relaxing = np.zeros(1), np.ones(1), np.zeros(1)  # a common rate does not exist
         self.waves, self.grid = waves, cast(Grid, grid)
         if grid is not None:
             #: Symbol of each exponential [m/Pa], of the fluidity [m/(Pa s)], and of the instantaneous response. [m/Pa]
@@ -364,11 +411,34 @@ def choose_memory(
         found, error = _series(body.material, shortest, duration, share)
         memory = Memory(found, duration, keeps_pressure)
         memory.series_error, memory.misfit = error, body.material.misfit * (duration > 0)
+        if error > 0 and duration > 0:
+            memory.shortest = shortest
+            memory.early = early_error(body.material.creep_compliance, found.creep_compliance, shortest)
         within = f" in place of the compliance, within {error:.1e} of it at time zero and from {shortest:.1g} s"
         memory.note = "; ".join(filter(None, (memory.note + within * bool(error), body.material.note)))
     if memory.series_error > tolerance:
         memory.note += "; no positive series comes nearer: the material is not passive"
     return memory
+
+
+def integrals_of_retarded(time: Array, tau: Array) -> tuple[Array, Array]:
+    """Return the integral of ``1 - exp(-t/tau)`` from zero to a time [s], and the integral of this integral. [s2]"""
+    ratio = time / tau
+    first = tau * (ratio + np.expm1(-ratio))
+    small = ratio**3 * (1 / 6 - ratio / 24)
+    return first, tau**2 * np.where(ratio < 1e-3, small, ratio**2 / 2 - ratio - np.expm1(-ratio))
+
+
+def early_error(exact: Callable[[Any], Any], series: Callable[[Any], Any], shortest: float) -> float:
+    """Return the error of a series below the shortest age at which it is known. [s]
+
+    It is the integral of the deviation of the series from the compliance up to this age, over the integral of the
+    series. Both functions return compliances of ages, the last axis; the result is the largest of all.
+    """
+    ages = shortest * np.geomspace(1e-8, 1.0, 400)
+    found = series(ages)
+    deviation = np.trapezoid(abs(found - exact(ages)) * ages, np.log(ages))
+    return float(np.max(deviation / np.trapezoid(found * ages, np.log(ages))))
 
 
 def _of_layers(body: LayeredBody, duration: float, share: float, shortest: float, grid: Any) -> Memory:
@@ -379,6 +449,14 @@ def _of_layers(body: LayeredBody, duration: float, share: float, shortest: float
     waves = layer_series(body.of(found), shortest, duration, max(share - max(errors), SERIES_SHARE * max(errors)))
     memory = LayerMemory(waves, duration, grid)
     memory.series_error, memory.misfit = waves.error + max(errors), max(one.misfit for one in given)
+    if duration > 0:
+        memory.shortest = shortest
+        pairs = zip(given, found, errors, strict=True)
+        of_materials = (early_error(a.creep_compliance, b.creep_compliance, shortest) for a, b, error in pairs if error)
+        few, bodies = waves.q[:: max(waves.q.size // 20, 1)], body.of(found)
+        course = interpolated(few, waves.q, waves.compliances)
+        of_waves = early_error(lambda t: bodies.creep(few, t), lambda t: (crept(waves.times, t) @ course).T, shortest)
+        memory.early = max(of_materials, default=0.0) + of_waves
     note = "the instantaneous compliance of each wave"
     if waves.times:
         within = f"within {memory.series_error:.1e} of these from {shortest:.1g} s on"

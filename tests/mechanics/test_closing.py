@@ -38,7 +38,7 @@ def test_taps__work_as_in_steps_eight_times_as_short():
     cycles = 3
     found, finer = (
         list(march(sphere(tapping(cycles), times=(cycles * PERIOD,), **how)))
-        for how in ({"tolerance": 1e-3}, {"time_step": PERIOD / 512, "tolerance": 1e-6})
+        for how in ({"tolerance": 1e-4}, {"time_step": PERIOD / 512, "tolerance": 1e-6})
     )
     assert contacts(found) == contacts(finer) == cycles
     assert found[-1].state.work == pytest.approx(finer[-1].state.work, rel=5e-3)
@@ -115,6 +115,9 @@ def test_row_just_before_an_imprint_closes__states_the_force_to_which_it_jumps()
     apart = found_again(list(march(sphere(program, body, tolerance=1e-3))), 0.5)
     late = sphere(program, body, times=(apart - 1e-7,), tolerance=1e-3)  # hardly longer than the resolution of the time
     assert list(march(late))[-1].point.time == 0.8
+    for _ in range(3):  # the steps, and with them the time, depend a little on the kept times
+        kept = (apart - 1e-7, apart + 1e-4)
+        apart = found_again(list(march(sphere(program, body, times=kept, tolerance=1e-3))), 0.5)
     kept = (apart - 1e-7, apart + 1e-4)
     before, after = (
         step for step in march(sphere(program, body, times=kept, tolerance=1e-3)) if step.point.time in kept

@@ -1,0 +1,309 @@
+"""Stated error of the time steps: the difference between two solutions, and what both share.
+
+The fine solution takes a pair of steps, the coarse solution takes the pair as one step. :func:`difference` states a
+part of the difference between them as the error at the end of the pair. Both solutions may share an error:
+
+- the difference has parts of first and of second order and may pass through zero (:meth:`Difference.at_least`);
+- the pressure of a cell that has just entered the contact is uncertain (:func:`entering`, :func:`entered_early`);
+- slow slides of soft bodies have the phase error of BDF2 at one and at two cells a step (:func:`phase_error`).
+
+The work of a pair is an integral over parabolas (:func:`work_of_pair`). Its error is the difference to straight lines,
+and after a corner of the program the part of the force that relaxes within a step.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from roughvisc.mechanics.grid import fft_of
+from roughvisc.mechanics.memory import STIFF
+from roughvisc.mechanics.program import Slide
+from roughvisc.mechanics.scene import SOFT, Array, Point, Scene
+from roughvisc.mechanics.tangential import tangential_force
+
+#: Part of the difference between the fine and the coarse solution that is stated as the error, of pressure and force,
+#: and of the approach. The difference is three times the error at second order and the error at first order. Measured
+#: on workflows/benchmarks/accuracy.py. Then the same for bodies with hardly any instantaneous compliance, whose first
+#: steps are of first order.
+STATED, STATED_SOFT = (0.6, 0.6), (1.0, 1.5)
+#: Part of the stated error before a pair that is stated after it at least, as far as relaxation leaves it.
+LASTING = 0.5
+#: Uncertain part of the pressure of a cell that has just entered the contact, if the pressure is due to creep.
+ENTERED = 0.3
+#: Error of this pressure that both solutions of a pair may share, as a part of the pressure times the square of the
+#: creep in the pair over the instantaneous compliance; at most the pressure itself. Measured on random contacts of
+#: 2 x 40 cells with eight per cent instantaneous compliance, and of 21 x 16 cells with four.
+SHARED = 0.1
+#: Pressure of a cell that may have entered the contact of a soft body, over the mean pressure.
+ENTERING = 2.5
+#: Error of the pressure after a slide by one cell, which has no coarse solution, as a part of the change of pressure.
+OF_ONE_CELL = 0.25
+#: Error of the work if the force is taken as linear over the approach and vanishes at one end, as a part of this work.
+#: On a sphere it is a fifth, on a cone a third.
+STRAIGHT = 0.25
+#: Force and approach are parabolas over a pair only if each of its steps covers at least this part of it.
+LEAST_PART = 0.1
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Stated error of the time steps, from the difference between the fine and the coarse solution.
+
+    Attributes
+    ----------
+    pressure : float
+        Error of the pressure: integral of its absolute value. [N]
+    force, approach : float
+        Errors of force and approach. [N, m]
+    inside, outside : float
+        Uncertain area in contact, and uncertain area out of contact. [m2]
+    friction : float
+        Error of the friction force of a slide. [N]
+    shared : float
+        Further error of the pressure, in cells that have entered the contact, which both solutions share. [N]
+    """
+
+    pressure: float = 0.0
+    force: float = 0.0
+    approach: float = 0.0
+    inside: float = 0.0
+    outside: float = 0.0
+    friction: float = 0.0
+    shared: float = 0.0
+
+    def at_least(self, before: Difference, left: float) -> Difference:
+        """Return at least a part of the errors before a pair; relaxation leaves the part `left` of a pressure."""
+        part = LASTING * left
+        return replace(
+            self,
+            pressure=max(self.pressure, part * before.pressure),
+            force=max(self.force, part * before.force),
+            approach=max(self.approach, LASTING * before.approach),
+            friction=max(self.friction, part * before.friction),
+        )
+
+    def or_larger(self, other: Difference, part: float = 1.0) -> Difference:
+        """Return the larger error of each kind, of this one and a part of the other."""
+        larger = np.maximum(list(vars(self).values()), part * np.array(list(vars(other).values())))
+        return Difference(*larger.tolist())
+
+
+def stated_parts(scene: Scene) -> tuple[float, float]:
+    """Return the stated error over the difference of both solutions: of pressure and force, and of the approach."""
+    return STATED_SOFT if scene.is_soft else STATED
+
+
+def difference(
+    scene: Scene, before: Point, fine: Point, coarse: Point, slide: Slide | None = None, *, is_kept: bool = False
+) -> Difference:
+    """Return the stated errors of a fine solution, from its difference to the coarse solution at the same time.
+
+    Parameters
+    ----------
+    scene : Scene
+        Input of the time stepping.
+    before : Point
+        Fine solution before the step.
+    fine, coarse : Point
+        Both solutions, with the pressures at that time.
+    slide : Slide or None
+        Motion, if the error of the friction force is needed.
+    is_kept : bool
+        Whether a kept row needs the uncertain area and the uncertain pressure of entering cells.
+    """
+    if fine is coarse:
+        return Difference()
+    grid, (stated, of_approach) = scene.grid, stated_parts(scene)
+    pressure, other = fine.pressure, coarse.pressure
+    apart = Difference(
+        pressure=stated * (float(abs(pressure - other).sum()) * grid.cell_area),
+        force=stated * abs(fine.force - coarse.force),
+        approach=of_approach * abs(fine.approach - coarse.approach),
+    )
+    if slide is not None:
+        of_friction = abs(friction(scene, fine, slide) - friction(scene, coarse, slide))
+        apart = replace(apart, friction=of_friction)
+    if not is_kept or (fine.is_open and coarse.is_open):
+        return apart
+    gap = scene.gap + scene.memory.displacement(fine.history)[0] - fine.approach
+    gap_of_coarse = scene.gap + scene.memory.displacement(coarse.history)[0] - coarse.approach
+    contact = pressure > 0
+    inside = contact & (pressure <= abs(pressure - other))
+    outside = ~contact & ((other > 0) | (gap <= abs(gap - gap_of_coarse)))
+    if scene.present is not None:
+        outside &= scene.present
+    cells, uncertain = int(contact.sum()), 0.0
+    if cells and scene.memory.grows(fine.time - before.time, SOFT):
+        uncertain = entering(scene, before, fine) + ENTERING * float(outside.sum()) * fine.force / cells
+    return replace(
+        apart,
+        pressure=apart.pressure + uncertain,
+        inside=grid.cell_area * float(inside.sum()),
+        outside=grid.cell_area * float(outside.sum()),
+    )
+
+
+def entering(scene: Scene, before: Point, after: Point) -> float:
+    """Return the uncertain force of cells that have entered between two points. [N]"""
+    compliance = scene.memory.compliance(after.time - before.time)
+    creeping = 1 - scene.memory.compliance(0.0) / compliance if compliance > 0 else 0.0
+    return ENTERED * creeping * force_of_entered(scene, before, after)
+
+
+def entered_early(scene: Scene, before: Point, after: Point) -> float:
+    """Return the error of the pressure of entered cells that both solutions of a pair share. [N]"""
+    creep = scene.memory.compliance(after.time - before.time) / scene.memory.compliance(0.0) - 1
+    return min(SHARED * creep**2, 1.0) * force_of_entered(scene, before, after)
+
+
+def force_of_entered(scene: Scene, before: Point, after: Point) -> float:
+    """Return the force on the cells that have entered between two points. [N]"""
+    return float(after.pressure[before.pressure == 0].sum()) * scene.grid.cell_area
+
+
+# ---------------------------------------------------------------------------------------------------------- friction
+
+
+def friction(scene: Scene, point: Point, slide: Slide) -> float:
+    """Return the friction force of a point. [N]"""
+    return tangential_force(scene.grid, point.pressure, scene.memory.displacement(point.history)[0], slide)
+
+
+def phase_error(scene: Scene, point: Point, slide: Slide, step: float) -> float:
+    r"""Return the error of the friction force of a slow slide by one cell a step. [N]
+
+    A wave that slides by the phase :math:`\theta` in a step of BDF2 has the rate of the phase
+    :math:`\sin\theta\,(2 - \cos\theta)` in place of :math:`\theta`. The friction of a slow wave is proportional to this
+    rate. Steps that the compliance hardly grows in do not use BDF2, and have no such error.
+    """
+    if not (scene.memory.may_ring and scene.memory.grows(step, STIFF)) or point.is_open:
+        return 0.0
+    fft, axis, count = fft_of(scene.grid.xp), slide.axis, point.pressure.shape[slide.axis]
+    spectra = [fft.rfft(field, axis=axis) for field in (point.pressure, scene.memory.displacement(point.history)[0])]
+    wave = scene.grid.xp.arange(1, (count + 1) // 2)
+    phase = 2 * math.pi / count * wave
+    power = (spectra[0].conj() * spectra[1]).imag.sum(axis=1 - axis)[1 : (count + 1) // 2]
+    friction_of_wave = 2 / count * power * phase / scene.grid.spacing[axis] * scene.grid.cell_area
+    off = scene.grid.xp.sin(phase) * (2 - scene.grid.xp.cos(phase)) / phase - 1
+    return float(abs(friction_of_wave * off).sum())
+
+
+# -------------------------------------------------------------------------------------------------------------- work
+
+
+def work_of_pair(
+    scene: Scene, start: Point, first: Point, end: Point, inside: list[Point], begins_at_corner: bool
+) -> tuple[list[float], float, float]:
+    """Return the work of the normal force from the start of a pair to points inside it and to its end. [J]
+
+    Force and approach are parabolas over time. If contact is lost in the second step, the force is a parabola over the
+    approach instead, and vanishes at the approach of last contact. After a jump the load is constant. If the steps are
+    too unequal, or the force would not fall steadily to zero, the force is linear over the approach in each step.
+
+    Parameters
+    ----------
+    scene : Scene
+        Input of the time stepping.
+    start, first, end : Point
+        Fine solution before the pair, after its first step and at its end.
+    inside : list of Point
+        Points within the pair, in order, `first` among them.
+    begins_at_corner : bool
+        Whether the pair is the first one after a corner of the program.
+
+    Returns
+    -------
+    works : list of float
+        Work to each point inside, and to the end.
+    first_error, error : float
+        Errors of the work to the first step and to the end.
+    """
+    points = [*inside, end]
+    straight = np.cumsum([work_of_step(scene, start, first), work_of_step(scene, first, end)]).tolist()
+    begin = np.array([first.force if start.is_late else start.force, touch(scene, start)])
+    changes = np.array([[point.force, touch(scene, point)] for point in (first, end)]) - begin
+    is_over_time = end.force > 0
+
+    def parameter(point: Point) -> float:
+        return point.time - start.time if is_over_time else touch(scene, point) - float(begin[1])
+
+    early, last = parameter(first), parameter(end)
+    is_curved = first.force > 0 and LEAST_PART * last**2 < early * last < (1 - LEAST_PART) * last**2
+    if is_curved:
+        bends = (changes[1] / last - changes[0] / early) / (last - early)
+        slopes = changes[0] / early - bends * early
+        is_curved = is_over_time or float(slopes[0] * (slopes[0] + 2 * bends[0] * last)) > 0
+    if not is_curved:
+        forces = [float(begin[0]), first.force, end.force]
+        uncertain = STRAIGHT * (1 - min(forces) / max(*forces, 1e-300))
+        path = [start, *points]
+        works = np.cumsum([work_of_step(scene, *ends) for ends in zip(path, points, strict=False)]).tolist()
+        return works, uncertain * abs(straight[0]), uncertain * abs(straight[1])
+    force = np.polynomial.Polynomial([begin[0], slopes[0], bends[0]])
+    rate = np.polynomial.Polynomial([slopes[1], 2 * bends[1]])
+    work = (force * rate).integ()
+    works = [float(work(parameter(point))) for point in points]
+    errors = [abs(line - float(work(at))) for line, at in zip(straight, (early, last), strict=True)]
+    if begins_at_corner and is_over_time and not start.is_late:
+        errors[1] += transient_error(scene, begin, changes, early, last)
+    return works, errors[0], errors[1]
+
+
+def transient_error(scene: Scene, begin: Array, changes: Array, early: float, last: float) -> float:
+    """Return the error of the work of a pair after a corner, due to a force or approach that relaxes within a step. [J]
+
+    At a corner the rate of the prescribed quantity changes. The other one then follows the integral of the relaxation
+    or creep function, ``S(t)``, to which a smooth change adds. ``begin + a t + b S(t)`` through the three points of a
+    pair has another integral than the parabola.
+
+    Parameters
+    ----------
+    scene : Scene
+        Input of the time stepping.
+    begin : array, shape (2,)
+        Force and approach at the corner. [N, m]
+    changes : array, shape (2, 2)
+        Changes of force and approach to the end of each step.
+    early, last : float
+        Ends of both steps, from the corner. [s]
+    """
+    error, times = 0.0, np.array([early, last])
+    for quantity, followed in ((0, scene.memory.relaxed), (1, scene.memory.crept)):
+        integral, twice = followed(times)
+        determinant = early * integral[1] - last * integral[0]
+        if abs(determinant) <= 1e-9 * last * abs(integral[1]):
+            continue
+        change = changes[:, quantity]
+        weight = (early * change[1] - last * change[0]) / determinant
+        slope = (change[0] - weight * integral[0]) / early
+        modal = slope * last**2 / 2 + weight * twice[1]
+        bend = (change[1] / last - change[0] / early) / (last - early)
+        smooth = (change[0] / early - bend * early) * last**2 / 2 + bend * last**3 / 3
+        error = max(error, float(abs((modal - smooth) * changes[1, 1 - quantity]) / last))
+    return error
+
+
+def work_of_step(scene: Scene, before: Point, after: Point, slides: bool = False) -> float:
+    """Return the work between two points. [J]
+
+    In a jump, and if an elastic body does not slide, the instantaneous compliance stores all work. Otherwise the force
+    is linear over the approach; after a jump it is constant.
+    """
+    memory = scene.memory
+    if after.time == before.time or (memory.is_elastic and not slides):
+        first = float((before.pressure * memory.displacement(before.history, 0.0)[0]).sum())
+        last = float((after.pressure * memory.displacement(after.history, 0.0)[0]).sum())
+        return 0.5 * last * scene.grid.cell_area - 0.5 * first * scene.grid.cell_area
+    force = after.force if before.is_late else before.force
+    return 0.5 * (force + after.force) * (touch(scene, after) - touch(scene, before))
+
+
+def touch(scene: Scene, point: Point) -> float:
+    """Return the approach of a point; while the surfaces are apart, the approach at which they would just touch. [m]"""
+    if not point.is_open:
+        return point.approach
+    surface = scene.gap + scene.memory.displacement(point.history)[0]
+    return max(point.approach, float(surface[scene.solid].min()))

@@ -1,0 +1,256 @@
+"""Lengths of the pairs of steps: the error that a pair adds, and the length of the next pair."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from roughvisc.mechanics.program import Segment
+from roughvisc.mechanics.scene import SOFT, Point, Scene
+from roughvisc.mechanics.stated_error import Difference, stated_parts
+
+#: Length of the first pair after an event, as a part of the segment: contact changes fast after a corner.
+FIRST_PAIR = 0.005
+#: Growth of the compliance in the first pair after a jump. In a longer pair the pressure would relax far within a step,
+#: and both solutions would share an error of the slow exponentials.
+RESOLVED = 1.5
+#: Part of the tolerance that a pair may add to the error: usually, and for bodies with hardly any instantaneous
+#: compliance. With 0.4, one in eight cases of such bodies has a row beyond the tolerance. With 0.2 a third to a half of
+#: these cases are within it, for 1.1 times the convolutions; with 0.1 three in five, for 1.26 times.
+SHARE, SHARE_SOFT = 0.3, 0.2
+#: Order of the error of a pair in its length, observed: cells enter and leave the contact within steps.
+ORDER = 1.5
+#: Safety factor of the length of the next pair.
+PLANNED = 0.9
+#: Ratio of the lengths of successive pairs: smallest, largest, and largest if the memory uses BDF2, which is unstable
+#: on steps that grow faster.
+SHRINK, GROW, GROW_STIFF = 0.3, 3.5, 2.3
+#: Least part of an error that counts as remaining after relaxation, because other errors do not fade.
+LEAST_REMAINING = 0.02
+#: A pair is rejected if the error that it adds exceeds the allowed error by the first factor. Shorter steps are tried.
+#: If they leave more than the second part of its error, the shorter pair is accepted: a cell that enters the contact
+#: makes the pressure jump, however short the pair is.
+REJECTED, REDUCED = 2.0, 0.93
+#: Shortest pair that is repeated in halves because it misses the tolerance at a kept time, as a part of the time since
+#: the segment began.
+LANDING_PAIR = 0.01
+#: Shortest pair, as a part of the segment, or of the time from its start to its first kept time.
+SHORTEST_PAIR = 1e-6
+#: Least number of pairs in a period of a cycle.
+PAIRS_OF_A_CYCLE = 8
+#: A pair ends at a kept time, or at the end of its segment, that lies within this part of its length around its end.
+SLACK = 0.2
+#: Times that differ by less than this part of a pair or a period are equal.
+ROUNDED = 1e-9
+#: Rounding of displacements, relative to the largest displacement that the mean pressure could cause.
+ROUNDING = 1e-11
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Fine and coarse solutions of a pair.
+
+    Attributes
+    ----------
+    before, coarse_before : Point
+        Both solutions before the pair.
+    first, second : Point
+        Fine solution after each step.
+    once : Point
+        Coarse solution at the end, in one step.
+    """
+
+    before: Point
+    coarse_before: Point
+    first: Point
+    second: Point
+    once: Point
+
+    @property
+    def length(self) -> float:
+        """Length of the pair. [s]"""
+        return self.second.time - self.before.time
+
+    def receding(self) -> bool:
+        """Return whether cells have left the contact."""
+        return bool((self.before.contact & ~self.second.contact).any())
+
+
+@dataclass(frozen=True)
+class Controller:
+    """Choice between acceptance and repetition of a pair, and of the length to try next.
+
+    Attributes
+    ----------
+    shortest : float
+        Pairs that are not longer are accepted. [s]
+    refused : float
+        Added error of the last refused trial of this pair, over the allowed error.
+    refused_at_row : float
+        Error of this trial at its kept row, over the tolerance.
+    """
+
+    shortest: float
+    refused: float = math.inf
+    refused_at_row: float = math.inf
+
+    def judge(
+        self, taken: float, ratio: float, at_row: float, *, opens: bool, is_stiff: bool
+    ) -> tuple[Controller | None, float]:
+        """Return the controller of the next trial, None if the pair is accepted, and the next length. [s]
+
+        Parameters
+        ----------
+        taken : float
+            Length of the pair. [s]
+        ratio : float
+            Error that the pair adds, over the allowed error.
+        at_row : float
+            Error at a kept row of the pair, over the tolerance; zero if it has none.
+        opens : bool
+            Whether contact seems to end although it should not: too long a step may undershoot.
+        is_stiff : bool
+            Whether the memory uses BDF2 in the next pair.
+        """
+        factor = PLANNED * max(ratio, 1e-300) ** (-1 / ORDER)
+        is_too_long = REJECTED < ratio < REDUCED * self.refused
+        misses = 1 < at_row < 0.9 * self.refused_at_row
+        if taken > self.shortest:
+            if opens:
+                return self, SHRINK * taken
+            if is_too_long:
+                return replace(self, refused=ratio), taken * max(factor, SHRINK)
+            if misses:
+                return replace(self, refused=ratio, refused_at_row=at_row), 0.5 * taken
+        return None, taken * min(max(factor, SHRINK), GROW_STIFF if is_stiff else GROW)
+
+
+def first_length(scene: Scene, segment: Segment, jumped: bool) -> float:
+    """Return the length of the first pair of a segment; `jumped` is whether a contact has jumped before it. [s]"""
+    length = FIRST_PAIR * min(segment.duration, segment.period)
+    return scene.memory.grown_after(RESOLVED, length) if jumped and scene.can_jump else length
+
+
+def shortest_length(scene: Scene, number: int) -> float:
+    """Return the shortest length of a pair in a segment. [s]"""
+    segment, began = scene.program.segments[number], scene.program.corners[number]
+    return SHORTEST_PAIR * min(segment.duration, scene.next_kept(began) - began)
+
+
+def pair_ends(scene: Scene, number: int, now: float, length: float, *, is_first: bool) -> tuple[float, float]:
+    """Return the middle and the end of the next pair of about a given length in a segment. [s]
+
+    The last kept time near the end of the pair becomes its end. The first pair after an event ends at a kept time at
+    the latest, because a fast relaxation in it may be over at its end. If `scene.time_step` is fixed, steps are at most
+    that long, and kept times are the middle or the end of pairs.
+    """
+    segment, (began, end) = scene.program.segments[number], scene.program.corners[number : number + 2]
+    if scene.time_step is not None:
+        longest = scene.time_step * (1 + ROUNDED)  # up to rounding
+        event = min(scene.next_kept(now), end)
+        following = min(scene.next_kept(event), end)
+        if event - now <= longest and event < following <= event + longest:
+            return event, following
+        pairs = max(math.ceil((event - now) / (2 * scene.time_step) - ROUNDED), 1)
+        return now + (event - now) / (2 * pairs), event if pairs == 1 else now + (event - now) / pairs
+    slack = SLACK
+    if segment.amplitude:  # equal pairs in each period: the work of a cycle is a sum over evenly spaced points
+        slack = ROUNDED
+        turn = began + segment.period * math.ceil((now - began) / segment.period * (1 + ROUNDED) + ROUNDED)
+        end = min(turn, end) if turn < end * (1 - ROUNDED) else end
+    end = min(end, scene.next_kept(now)) if is_first else end
+    pairs = max(math.ceil((end - now) / length - SLACK), 1)
+    last = end if pairs == 1 else now + (end - now) / pairs
+    near = scene.kept_within(now + (1 - slack) * (last - now), min(now + (1 + slack) * (last - now), end))
+    last = near[-1] if near else last
+    middle = now + (last - now) / 2
+    rounded = scene.kept_within(middle - ROUNDED * (last - now), middle + ROUNDED * (last - now))
+    return (rounded[0] if rounded else middle), last
+
+
+def errors_over_allowed(
+    scene: Scene, pair: Pair, number: int, error: Difference, shared: float, kept: tuple[float, float], *, lands: bool
+) -> tuple[float, float]:
+    """Return the error that a pair adds at the next kept time, and its error at a kept row, over the allowed errors.
+
+    Errors are relative to the largest force and approach of the kept rows, the next one included, as the stated errors
+    are. An approach counts as at least its rounding error: a flat periodic surface has no larger approach.
+
+    Parameters
+    ----------
+    scene : Scene
+        Input of the time stepping.
+    pair : Pair
+        Both solutions.
+    number : int
+        Index of the segment.
+    error : Difference
+        Stated error at the end of the pair.
+    shared : float
+        Error of the pressure that both solutions share. [N]
+    kept : tuple of float
+        Largest force and approach of the kept rows so far; a given approach is the largest of all steps. [N, m]
+    lands : bool
+        Whether the pair contains a kept row.
+    """
+    second, taken, memory = pair.second, pair.length, scene.memory
+    force = max(kept[0], pair.first.force, second.force, 1e-300)
+    rounding = ROUNDING * memory.compliance(second.time) * scene.grid.largest_eigenvalue * force / scene.gap.size
+    approach = max(kept[1], abs(pair.first.approach), abs(second.approach), rounding / scene.grid.cell_area, 1e-300)
+
+    row, (stated, of_approach) = 0.0, stated_parts(scene)
+    if lands and scene.keeps(second.time) and taken > LANDING_PAIR * (second.time - scene.program.corners[number]):
+        of_pressure = max(error.pressure / stated, error.pressure + shared) / force
+        row = max(of_pressure, error.approach / of_approach / approach) / scene.tolerance
+
+    following = second.time if lands else min(scene.next_kept(second.time), scene.program.duration)
+    ahead = growth_until(scene, number, second, following)
+    scales = max(force, second.force * ahead), max(approach, abs(second.approach) * ahead**0.5)
+    share = SHARE_SOFT if scene.is_soft else SHARE
+    return added(scene, pair, number, following, scales) / (share * scene.tolerance), row
+
+
+def growth_until(scene: Scene, number: int, point: Point, following: float) -> float:
+    """Return the growth of the prescribed value until the next kept time, at least one."""
+    until = min(following, scene.program.corners[number + 1])
+    now = scene.program.prescribed(number, point.time, point.start)
+    then = scene.program.prescribed(number, until, point.start)
+    return max(then / now, 1.0) if now > 0 else 1.0
+
+
+def added(scene: Scene, pair: Pair, number: int, following: float, scales: tuple[float, float]) -> float:
+    """Return the error that a pair adds at the next kept time: of pressure, approach, and displaced surface.
+
+    The error is the change of the difference between both solutions over the pair, from its value before the pair or
+    from the part that relaxation leaves of this value.
+
+    Parameters
+    ----------
+    scene, pair, number : Scene, Pair, int
+        Input, both solutions, and index of the segment.
+    following : float
+        Next kept time. [s]
+    scales : tuple of float
+        Force and approach to which errors are relative. [N, m]
+    """
+    memory, second, once, taken = scene.memory, pair.second, pair.once, pair.length
+    is_soft, by_load = memory.grows(taken, SOFT), scene.program.segments[number].control == "load"
+    receding = pair.receding()
+    after = second.pressure - once.pressure
+    before = pair.before.pressure - pair.coarse_before.pressure
+    change = float(abs(after - before).sum())
+    if is_soft:
+        remains = memory.compliance(taken) / memory.compliance(following - second.time + taken)
+        remains = 1.0 if receding else remains
+    else:
+        change = min(change, float(abs(after - memory.remaining(taken) * before).sum()))
+        remains = max(memory.remaining(following - second.time), LEAST_REMAINING)
+    largest = change * scene.grid.cell_area / scales[0] * remains
+    if by_load:
+        of_approach = (second.approach - once.approach) - (pair.before.approach - pair.coarse_before.approach)
+        largest = max(largest, abs(of_approach) / scales[1])
+    if not by_load or second.is_open or is_soft:
+        surface = memory.displacement(second.history)[0] - memory.displacement(once.history)[0]
+        surface -= memory.displacement(pair.before.history)[0] - memory.displacement(pair.coarse_before.history)[0]
+        largest = max(largest, float(abs(surface).max()) / scales[1] * (1.0 if is_soft or receding else remains))
+    return largest
