@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -179,8 +179,8 @@ def read_table(path: str | Path, wanted: Mapping[str, Wanted]) -> tuple[dict[str
     if not below:
         raise InputError(f"{path}: holds no rows below the heading in line {line}: expected {', '.join(wanted)}")
     places = {key: found for key, one in wanted.items() if (found := _places(heading, one.name))}
-    factors = {
-        key: _factor(path, line, [heading[at] for at in found], key, wanted[key]) for key, found in places.items()
+    converted = {
+        key: _conversion(path, line, [heading[at] for at in found], key, wanted[key]) for key, found in places.items()
     }
     for row, cells in below:
         if any(cells[len(heading) :]) or (separator == " " and len(cells) != len(heading)):
@@ -197,7 +197,7 @@ def read_table(path: str | Path, wanted: Mapping[str, Wanted]) -> tuple[dict[str
             if not math.isfinite(value):
                 where, expected = f"{path}, line {row}", f"a number for {key}"
                 raise InputError(f"{where}: found {cell!r}: expected {expected}", found=cell, expected=expected)
-        columns[key] = np.array([float(f"{value * factors[key]:.15g}") for value in values])
+        columns[key] = np.array(list(map(converted[key], values)))
     return columns, [row for row, _ in below]
 
 
@@ -289,8 +289,8 @@ def _example(name: str, unit: str) -> str:
     return name if name_and_unit(name)[1] or unit == "1" else f"{name} [{unit}]"
 
 
-def _factor(path: Path, line: int, names: Sequence[str], key: str, one: Wanted) -> float:
-    """Return the factor from the unit of a column to the wanted one; refuse a column without one unit."""
+def _conversion(path: Path, line: int, names: Sequence[str], key: str, one: Wanted) -> Callable[[float], float]:
+    """Return the conversion from the unit of a column to the wanted one; refuse a column without one unit."""
     where = f"{path}, line {line}"
     if len(names) > 1:
         raise InputError(f"{where}: {key} = {one.name!r} fits the columns {', '.join(names)}: expected one")
@@ -306,6 +306,9 @@ def _factor(path: Path, line: int, names: Sequence[str], key: str, one: Wanted) 
         message = f"{where}: found the column {found!r} without a unit: expected a heading, {expected!r}"
         raise InputError(message, found=found, expected=expected)
     try:
-        return 1.0 if unit == one.unit else number(f"1 {unit}", one.unit)
+        factor, zero = (1.0, 0.0) if unit == one.unit else (number(f"{n} {unit}", one.unit) for n in (1, 0))
     except InputError as error:
         raise error.prefixed(f"{path}: unit of {key}") from error
+    if zero:  # degrees Celsius count from 273.15 K
+        return lambda value: number(f"{value!r} {unit}", one.unit)
+    return lambda value: float(f"{value * factor:.15g}")

@@ -124,6 +124,17 @@ def test_heading__stated_units_stand_in_for_absent_ones_and_must_agree(tmp_path)
         read_table(path, {"load": Wanted("load [N]", "N")})
 
 
+@pytest.mark.parametrize(("unit", "rise"), [("degC", 1.0), ("°C", 1.0), ("degF", 5 / 9), ("K", 1.0)])
+def test_temperatures__count_from_the_zero_of_their_unit_and_differences_do_not(unit, rise, tmp_path):
+    """20 degrees Celsius are 293.15 K, and a rise by 20 degrees per minute is a third of a kelvin per second."""
+    zero = {"K": 0.0, "degF": 459.67 * 5 / 9}.get(unit, 273.15)
+    path = tmp_path / "table.csv"
+    path.write_text(f"temperature [{unit}];heating [{unit}/min]\n20;20\n-1.5;0\n68.25;1\n")
+    read, _ = read_table(path, {"temperature": Wanted("temperature", "K"), "heating": Wanted("heating", "K/s")})
+    np.testing.assert_allclose(read["temperature"], zero + rise * np.array([20, -1.5, 68.25]), rtol=1e-14)
+    np.testing.assert_allclose(read["heating"], rise * np.array([20, 0, 1]) / 60, rtol=1e-14)
+
+
 def test_frequencies__are_not_converted_to_angular_ones(tmp_path):
     path = tmp_path / "table.csv"
     path.write_text("frequency [rad/s]\n1\n")

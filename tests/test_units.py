@@ -38,6 +38,8 @@ UNITS = st.sampled_from(["m", "N", "Pa", "s", "Pa s"])
         ("1e3 Hz", "1/s", 1e3),
         ("180 degree", "rad", math.pi),
         ("20 degC", "K", 293.15),
+        ("5 delta_degC", "K", 5.0),
+        ("0.2 W/m/degC", "W/m/K", 0.2),
     ],
 )
 def test_number__reads_number_and_unit(text, unit, expected):
