@@ -16,7 +16,7 @@ from roughvisc.topography.grid import checked, labelled, like, noted, spacing, w
 from roughvisc.topography.spectrum import resample
 from roughvisc.units import Quantity, number, quantities
 
-#: Largest shift of a cell border by rounding, relative to the cell.
+#: Largest shift of a cell border or a centre by rounding, relative to the cell.
 _ON_BORDER = 1e-9
 
 
@@ -50,7 +50,8 @@ def crop(
             if chosen[axis][0] >= chosen[axis][1]:
                 raise InputError(key=axis, found=limits, expected="a pair (low, high) [m], the lower limit first")
     h = checked(h, "crop")
-    part = h.sel({axis: slice(*limits) for axis, limits in chosen.items()})
+    off = {axis: _ON_BORDER * side for axis, side in zip(("x", "y"), spacing(h), strict=True)}
+    part = h.sel({axis: slice(low - off[axis], high + off[axis]) for axis, (low, high) in chosen.items()})
     for axis, limits in chosen.items():
         if part.sizes[axis] < 2:
             held = f"{float(h[axis][0]):.6g} to {float(h[axis][-1]):.6g}"

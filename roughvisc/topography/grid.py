@@ -200,7 +200,9 @@ def rms_slope(h: xr.DataArray, periodic: bool = False, depth: float = math.inf) 
 
 
 def squared_slopes(h: xr.DataArray, periodic: bool = False, depth: float = math.inf) -> np.ndarray:
-    """Return the squared slopes at the corners of three present points, (i, j), (i+1, j), (i, j+1). [-]
+    """Return the squared slopes at the corners of three present points: a point and one neighbour along each axis. [-]
+
+    Each point inside has four corners, so that a map and its mirror images have the same slopes.
 
     Parameters
     ----------
@@ -219,12 +221,14 @@ def squared_slopes(h: xr.DataArray, periodic: bool = False, depth: float = math.
     (dx, dy), (nx, ny) = spacing(h), h.shape
     beyond = (0, int(periodic or nx == 1)), (0, int(periodic or ny == 1))  # a strip one cell wide repeats too
     z = np.pad(h.values, beyond, mode="wrap")
-    squares = ((z[1:, :-1] - z[:-1, :-1]) / dx) ** 2
-    squares += ((z[:-1, 1:] - z[:-1, :-1]) / dy) ** 2
+    along_x, along_y = (np.diff(z, axis=0) / dx) ** 2, (np.diff(z, axis=1) / dy) ** 2
+    sides = slice(None, -1), slice(1, None)
+    squares = np.stack([along_x[:, j] + along_y[i] for i in sides for j in sides])
     counts = np.isfinite(squares)
     if depth < math.inf:
-        lowest = np.nanmax(h.values) - depth
-        counts &= np.maximum(np.maximum(z[1:, :-1], z[:-1, 1:]), z[:-1, :-1]) >= lowest
+        at_x, at_y = np.maximum(z[1:], z[:-1]), np.maximum(z[:, 1:], z[:, :-1])
+        highest = np.stack([np.maximum(at_x[:, j], at_y[i]) for i in sides for j in sides])
+        counts &= highest >= np.nanmax(h.values) - depth
     return squares[counts] if counts.any() else np.array([np.nan])
 
 

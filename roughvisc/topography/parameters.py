@@ -44,8 +44,10 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
 
     Notes
     -----
-    Slopes are first differences to the next point, as in SurfaceTopography. They underestimate short wavelengths: a
-    wavelength of :math:`n` cells by the factor :math:`\mathrm{sinc}(1/n)`. Sdr is a ratio, not in per cent.
+    Slopes are first differences between neighbouring points. They underestimate short wavelengths: a wavelength of
+    :math:`n` cells by the factor :math:`\mathrm{sinc}(1/n)`. Sdq and Sdr are means over corners of three points, four
+    in each square of points, so that mirror images of a map have the same parameters. SurfaceTopography takes one
+    corner of each square; for a periodic surface Sdq is the same. Sdr is a ratio, not in per cent.
 
     References
     ----------

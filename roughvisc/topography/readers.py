@@ -43,6 +43,8 @@ _OFF = 0.01
 #: Largest distance between points of one line of the lattice, over the distance between lines; and largest number of
 #: nodes per point.
 _WITHIN, _SPARSE = 0.1, 64
+#: Largest distance of a point from the border of a cell by rounding, in cells.
+_ON_BORDER = 1e-9
 
 
 def read_file(path: Path, given: Mapping[str, Any]) -> xr.DataArray:
@@ -324,10 +326,11 @@ def gridded(points: np.ndarray, side: float) -> np.ndarray:
     """
     points = points[np.isfinite(points).all(axis=1)]
     low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
-    shape = np.maximum(np.ceil((high - low) / side - 1e-9), 1)
+    shape = np.maximum(np.ceil((high - low) / side - _ON_BORDER), 1)
     if min(shape) < 2 or np.prod(shape) > MOST_CELLS:
         raise InputError(key="grid", found=side, expected=f"a side that fits at least twice into {high - low}")
     nx, ny = shape.astype(int)
-    i, j = np.minimum((points[:, :2] - low) / side, shape - 1).astype(int).T
+    # a point on a border belongs to the upper cell, in any unit of length
+    i, j = np.minimum((points[:, :2] - low) / side + _ON_BORDER, shape - 1).astype(int).T
     count, total = (np.bincount(i * ny + j, weights, nx * ny) for weights in (None, points[:, 2]))
     return np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(nx, ny)

@@ -23,7 +23,7 @@ from roughvisc.errors import InputError
 from roughvisc.topography.borders import is_mirrored, is_periodic, period_of
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.grid import checked, counts, labelled, noted, pair, spacing, with_coordinates
-from roughvisc.topography.spectrum import psd, wavevectors
+from roughvisc.topography.spectrum import psd, ring_numbers, wavevectors
 from roughvisc.units import Quantity, number, quantities
 
 #: Largest number of cells of an indenter on a larger grid.
@@ -406,10 +406,10 @@ def surrogate(h: xr.DataArray, number: int, *, seed: int = 0) -> xr.DataArray:
     sides = spacing(h)
     q_x, q_y, _ = wavevectors(h.shape, sides)
     q = np.hypot(q_x[:, None], q_y)
-    rings = np.round(spectrum["wavevector"].values / step).astype(int)
+    rings = ring_numbers(spectrum["wavevector"].values, step)
     density = np.zeros(rings[-1] + 1)
     density[rings] = spectrum["psd"].values
-    ring = np.maximum(np.round(q / step).astype(int), 1)
+    ring = ring_numbers(q, step)
     inside = (q > 0) & (q < np.pi / max(sides) * (1 - 1e-12))
     variance = np.where(inside, density[np.where(inside, ring, 0)], 0.0) / (h.size * math.prod(sides))
     heights = random_heights(np.sqrt(variance), h.shape[1], entropy, normal=True)

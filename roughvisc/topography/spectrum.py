@@ -22,8 +22,8 @@ from roughvisc.units import Quantity, number, quantities
 
 #: Share of the mean square slope in the waves down to the shortest wave of a surface.
 _OF_SLOPE = 0.99
-#: Largest reduction of an overlap by rounding, relative to a cell.
-_ROUNDING = 1e-9
+#: Largest reduction of an overlap by rounding, relative to a cell; and the same of a wavevector, relative to a ring.
+_ROUNDING, _ON_RING = 1e-9, 1e-9
 
 
 def hann(z: np.ndarray) -> np.ndarray:
@@ -62,7 +62,7 @@ def last_octave(z: np.ndarray, cells: tuple[float, float]) -> tuple[np.ndarray, 
     order = np.argsort(q, axis=None)
     summed = np.cumsum((q**2 * power).ravel()[order])
     end = q.ravel()[order][np.searchsorted(summed, _OF_SLOPE * summed[-1])] if summed[-1] > 0 else 0.0
-    return q, power, 0.5 * float(end)
+    return q, power, 0.5 * float(end) * (1 + _ON_RING)  # a wave twice as long lies before it in any unit
 
 
 def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
@@ -111,7 +111,7 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
     z = h.values - h.values.mean()
     density = np.abs(scipy.fft.rfft2(z if window is None else hann(z))) ** 2 * (cells[0] * cells[1] / h.size)
     q = np.hypot(q_x[:, None], q_y)
-    ring = np.maximum(np.round(q / step).astype(int), 1)
+    ring = ring_numbers(q, step)
     ring[q == 0] = 0  # the mean
     count = np.broadcast_to(stands_for, q.shape)
     counted, at, total = (np.bincount(ring.ravel(), one.ravel())[1:] for one in (count, count * q, count * density))
@@ -123,6 +123,14 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
         "wavevector": ("wavevector", at[ring] / counted[ring], {"units": "rad/m", "long_name": "wavevector"}),
     }
     return xr.Dataset(variables, attrs={"area": h.size * cells[0] * cells[1]})
+
+
+def ring_numbers(q: np.ndarray, step: float) -> np.ndarray:
+    """Return the number of the ring of each wavevector, from 1; the width of a ring is `step`. [rad/m]
+
+    On cells 1 : 2 many wavevectors lie on the border of two rings. They belong to the outer one, in any unit of length.
+    """
+    return np.maximum((q / step + (0.5 + _ON_RING)).astype(int), 1)
 
 
 def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | None = None) -> xr.DataArray:

@@ -9,7 +9,7 @@ from roughvisc.topography.filters import off_plane
 from roughvisc.topography.grid import labelled, rms_slope, spacing
 from roughvisc.topography.parameters import PARAMETERS, parameters
 from roughvisc.topography.readers import from_array
-from roughvisc.topography.recipes import self_affine, wavy
+from roughvisc.topography.recipes import self_affine, surrogates, wavy
 from roughvisc.topography.spectrum import psd
 
 SIZE, SHAPE = (3e-4, 2e-4), (61, 48)
@@ -21,6 +21,11 @@ def theirs(h, periodic):
     topography = pytest.importorskip("SurfaceTopography").Topography
     size = tuple(n * d for n, d in zip(h.shape, spacing(h), strict=True))
     return topography(np.ma.masked_invalid(h.values), size, periodic=periodic)
+
+
+def mirror_images(h):
+    """The surface and its images, each read from another corner, on the same coordinates."""
+    return [h.copy(data=h.values[::i, ::j]) for i in (1, -1) for j in (1, -1)]
 
 
 @pytest.mark.parametrize("waves", [1, 2])
@@ -50,9 +55,11 @@ def test_rms_slope__of_what_is_near_the_highest_point():
 
 @pytest.mark.parametrize("periodic", [False, True])
 def test_parameters__agree_with_surface_topography(periodic):
+    """They take one corner of each square of four points; the mean over the mirror images takes all four corners."""
     found, their = parameters(ROUGH, periodic=periodic), theirs(ROUGH, periodic)
     assert float(found["Sq"]) == pytest.approx(their.Sq(), rel=1e-12)
-    assert float(found["Sdq"]) == pytest.approx(their.rms_gradient(), rel=1e-12)
+    slopes = [theirs(image, periodic).rms_gradient() for image in mirror_images(ROUGH)]
+    assert float(found["Sdq"]) == pytest.approx(np.sqrt(np.mean(np.square(slopes))), rel=1e-12)
 
 
 def test_parameters__leave_missing_points_out():
@@ -62,10 +69,12 @@ def test_parameters__leave_missing_points_out():
     assert float(found["missing_fraction"]) == pytest.approx(1 - z.size / h.size)
     assert float(found["Sq"]) == pytest.approx(theirs(h, False).Sq(), rel=1e-12)
     slopes = []
-    for i, j in np.ndindex(SHAPE[0] - 1, SHAPE[1] - 1):
-        a, b, c = h.values[i, j], h.values[i + 1, j], h.values[i, j + 1]
-        if np.isfinite(a + b + c):
-            slopes.append(((b - a) / (SIZE[0] / 61)) ** 2 + ((c - a) / (SIZE[1] / 48)) ** 2)
+    for i, j in np.ndindex(SHAPE):
+        for k, m in ((i - 1, j - 1), (i - 1, j + 1), (i + 1, j - 1), (i + 1, j + 1)):
+            if 0 <= k < SHAPE[0] and 0 <= m < SHAPE[1]:
+                a, b, c = h.values[i, j], h.values[k, j], h.values[i, m]
+                slopes.append(((b - a) / (SIZE[0] / 61)) ** 2 + ((c - a) / (SIZE[1] / 48)) ** 2)
+    slopes = [slope for slope in slopes if np.isfinite(slope)]
     assert float(found["Sdq"]) == pytest.approx(np.sqrt(np.mean(slopes)), rel=1e-10)
     assert float(found["Sdr"]) == pytest.approx(np.mean(np.sqrt(1 + np.array(slopes)) - 1), rel=1e-6)
     checkerboard = h.where((np.arange(61)[:, None] + np.arange(48)) % 2 == 0)
@@ -74,7 +83,12 @@ def test_parameters__leave_missing_points_out():
         parameters(h * np.nan)
 
 
-def test_parameters__are_the_same_in_nanometres_and_at_a_large_offset():
+def test_parameters__are_the_same_from_any_side_in_nanometres_and_at_a_large_offset():
+    holed = ROUGH.where(np.random.default_rng(0).random(SHAPE) > 0.1)
+    holed[-1, -1] = 1e-4  # a spike in the last corner
+    for h in (*mirror_images(holed), holed.transpose("y", "x").rename(x="y", y="x")):
+        for name, value in parameters(h).items():
+            assert float(value) == pytest.approx(float(parameters(holed)[name]), rel=1e-12), name
     small = (ROUGH * 1e-3).assign_coords(x=ROUGH.x * 1e-3, y=ROUGH.y * 1e-3)
     found, tiny, lifted = parameters(ROUGH), parameters(small), parameters(ROUGH + 7e-2)
     for name in found:
@@ -92,6 +106,23 @@ def test_psd__sums_to_the_variance(shape):
     assert int(spectrum["modes"].sum()) == h.size - 1
     assert (np.diff(spectrum["wavevector"]) > 0).all()
     assert spectrum.attrs["area"] == pytest.approx(h.size * 6e-12)
+
+
+@pytest.mark.parametrize(
+    ("shape", "sides"), [((64, 64), (1, 4)), ((40, 40), (4, 1)), ((64, 32), (1, 1)), ((33, 2), (1, 3))]
+)
+def test_psd__and_surrogates_are_the_same_in_any_unit_and_on_the_transpose(shape, sides):
+    """With sides 1 : 2 and 1 : 4 many wavevectors lie on the border of two rings."""
+    heights = np.random.default_rng(0).normal(0, 1e-7, shape)
+    for unit in (1e-6, 1.5e-6, 2e-6, 3e-6):
+        h, turned = from_array(heights, np.multiply(unit, sides)), from_array(heights.T, np.multiply(unit, sides[::-1]))
+        found, first = psd(h), psd(from_array(heights, np.multiply(1e-3, sides)))
+        np.testing.assert_array_equal(found["modes"], first["modes"])
+        np.testing.assert_allclose(found["wavevector"] * unit, first["wavevector"] * 1e-3, rtol=1e-12)
+        np.testing.assert_allclose(found["psd"] / unit**2, first["psd"] / 1e-3**2, rtol=1e-12)
+        np.testing.assert_allclose(psd(turned)["psd"], found["psd"], rtol=1e-12)
+        same = [surrogates(from_array(heights, np.multiply(one, sides)), 1, seed=1) for one in (unit, 1e-3)]
+        np.testing.assert_allclose(*same, rtol=0, atol=1e-12 * float(np.std(heights)))
 
 
 def test_psd__window_keeps_the_level_of_noise_and_stops_leakage():
