@@ -28,7 +28,7 @@ from roughvisc.topography.borders import border_mismatch
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.grid import rms_slope, spacing
 from roughvisc.topography.recipes import is_analytic, recipe_name
-from roughvisc.topography.spectrum import hann, last_octave
+from roughvisc.topography.spectrum import hann, is_narrow_band, last_octave
 from roughvisc.units import Quantity, format_quantity, quantities
 from roughvisc.variables import axis_of
 
@@ -51,7 +51,8 @@ _FLAT = 1e4
 _SOFTEST = 0.5
 #: Margin of the shortest wavelength of a recipe.
 _JUST_BELOW = 0.99
-#: Number of the resolution check for a surface without roughness: 1 - sqrt(0.99).
+#: Number of the resolution check for a surface without roughness, such as a form or waves of one length:
+#: 1 - sqrt(0.99).
 _ONLY_FORM = 0.005
 
 #: Number and sentence of a finding; None if the assumption does not apply.
@@ -361,6 +362,9 @@ def resolution(scene: Scene) -> Found:
         complete = shortest > 2 * max(scene.cells) and longest / 2 > _JUST_BELOW * shortest
     if complete:
         return 0.0, "The recipe has no wavelengths shorter than two cells."
+    if is_narrow_band(scene.height):
+        ends = as_text(longest / 2, "m")
+        return _ONLY_FORM, f"Waves of one length: 99 % of the squared slope lies above {ends}, in a narrow band."
     if scene.is_smooth:
         return _ONLY_FORM, f"Only form: 99 % of the squared slope lies above {as_text(longest / 2, 'm')}."
     if math.isnan(last):

@@ -31,7 +31,7 @@ from roughvisc.study.storage.netcdf import open_result
 from roughvisc.study.study_file import TEMPERATURE
 from roughvisc.topography.conditioning import FACE_STEPS
 from roughvisc.topography.grid import spacing
-from roughvisc.topography.spectrum import last_octave
+from roughvisc.topography.spectrum import is_narrow_band, last_octave
 from roughvisc.units import Quantity, number, quantities, unit_for
 from roughvisc.variables import VARIABLES
 
@@ -353,7 +353,9 @@ def sources_of(
     elif sample:
         end, shortest = unit_for(cutoff, "m").text(cutoff, 3), shortest_wave(height)
         found[OCTAVE] = Source(f"the grid holds all waves down to {end}")
-        if shortest >= _SAME * cutoff:
+        if is_narrow_band(height):
+            found[OCTAVE] = Source("the surface has waves of one length, and no shorter ones")
+        elif shortest >= _SAME * cutoff:
             octaves = math.log2(shortest / cutoff)
             words = f"without the shortest octave; {octaves:.2g} octaves down to {end} are missing"
             smooth = vary(own, {"surface.shortest_wave": 2 * shortest})

@@ -22,6 +22,8 @@ from roughvisc.units import Quantity, number, quantities
 
 #: Share of the mean square slope in the waves down to the shortest wave of a surface.
 _OF_SLOPE = 0.99
+#: Largest bandwidth of waves of nearly one length, of their heights and of their slopes, and fewest cells along a side.
+_OF_HEIGHTS, _OF_SLOPES, _FEWEST = 1.15, 1.1, 8
 #: Largest reduction of an overlap by rounding, relative to a cell; and the same of a wavevector, relative to a ring.
 _ROUNDING, _ON_RING = 1e-9, 1e-9
 
@@ -63,6 +65,37 @@ def last_octave(z: np.ndarray, cells: tuple[float, float]) -> tuple[np.ndarray, 
     summed = np.cumsum((q**2 * power).ravel()[order])
     end = q.ravel()[order][np.searchsorted(summed, _OF_SLOPE * summed[-1])] if summed[-1] > 0 else 0.0
     return q, power, 0.5 * float(end) * (1 + _ON_RING)  # a wave twice as long lies before it in any unit
+
+
+def is_narrow_band(h: xr.DataArray) -> bool:
+    r"""Return whether the slopes of a surface are those of waves of nearly one length, longer than four cells.
+
+    Nayak's bandwidth :math:`m_0 m_4 / m_2^2` is 1 for waves of one length, 4/3 for waves of equal power up to a limit,
+    and 2 for such waves under a Gaussian filter. With :math:`m_2 m_6 / m_4^2` it is the bandwidth of the slopes, which
+    form and tilt do not enter: 1, 9/8 and 3/2. The moments are mean squares of heights, slopes, Laplacians, and slopes
+    of Laplacians, by differences inside the map.
+
+    Parameters
+    ----------
+    h : xarray.DataArray, dims (x, y)
+        Heights without missing points. [m]
+
+    References
+    ----------
+    .. [1] P. R. Nayak, J. Lubr. Technol. 93 (1971) 398.
+    """
+    z, cells, moments = h.values - h.values.mean(), spacing(h), list[float]()
+    axes = [axis for axis in (0, 1) if h.shape[axis] > 1]  # heights do not vary across a strip
+    if min((h.shape[axis] for axis in axes), default=0) < _FEWEST:
+        return False
+    for _ in range(2):
+        moments += [np.mean(z**2), sum(np.mean((np.diff(z, axis=axis) / cells[axis]) ** 2) for axis in axes)]
+        inside = tuple(slice(1, -1) if axis in axes else slice(None) for axis in (0, 1))
+        around = {axis: tuple(slice(None) if other == axis else inside[other] for other in (0, 1)) for axis in axes}
+        z = sum(np.diff(z, 2, axis)[around[axis]] / cells[axis] ** 2 for axis in axes)
+    m0, m2, m4, m6 = moments
+    is_long = m4 * (2 * max(cells) / np.pi) ** 2 < m2  # four cells or more
+    return bool(is_long and (m0 * m4 < _OF_HEIGHTS * m2**2 or m2 * m6 < _OF_SLOPES * m4**2))
 
 
 def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:

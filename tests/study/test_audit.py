@@ -258,6 +258,30 @@ def test_resolution__of_a_measured_ball_is_that_of_its_form(ball):
     assert rv.audit(ds)["resolution"].verdict == "holds"
 
 
+@pytest.mark.parametrize("sides", [(5e-7, 5e-7), (5e-7, 2e-6), (2e-6, 5e-7)])
+def test_resolution__of_a_regular_texture_holds_with_and_without_the_filter_that_scan_recommends(sides):
+    """A line of the spectrum near the cut-off is not unresolved roughness; noise, and noise under a filter, are."""
+    longest = max(sides)
+    x, y = (np.arange(0.5 * side, length * longest, side) for length, side in zip((105, 69), sides, strict=True))
+    along_x, along_y = np.sin(2 * np.pi * x / (18.6 * longest)), np.sin(2 * np.pi * y / (26 * longest))
+    texture, noise = np.outer(along_x, along_y), np.random.default_rng(0).standard_normal((x.size, y.size))
+
+    def verdict(heights, cutoff=None):
+        surface = rv.from_array(1e-6 * heights, sides)
+        surface = rv.gaussian_filter(surface, cutoff) if cutoff else surface
+        return rv.audit(pressed(surface, "mirror"))["resolution"].verdict
+
+    for heights in (texture, np.outer(along_x, np.ones(y.size)), texture + np.add.outer(x, y) / (100 * longest)):
+        for cells in (10, 15):
+            assert verdict(heights, cells * longest) == "holds"
+    noisy = texture + 0.04 * noise
+    recommended = rv.inspect(rv.from_array(1e-6 * noisy, sides)).steps["filter"]
+    assert verdict(noisy, recommended) == "holds"
+    for rough in (noise, noise + texture):
+        for cutoff in (None, 4 * longest):
+            assert verdict(rough, cutoff) != "holds"
+
+
 def test_resolution__of_heights_that_are_no_longer_the_recipe_s_is_by_the_last_octave():
     surface = generated(8e-5)
     noise = 1e-7 * np.random.default_rng(1).standard_normal(surface.shape)
