@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from roughvisc.errors import InputError
+from roughvisc.experiment.accuracy import filled_warning
 from roughvisc.experiment.base import Experiment, Outgrown, Row, Rows
 from roughvisc.experiment.grid_error import with_grid_error
 from roughvisc.experiment.loading import Loading
@@ -242,7 +243,7 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     for material in rows.problem.body.materials:
         if material.warning and material.warning not in tables:
             tables.append(material.warning)
-    for subject, text in (warnings | {"material": " ".join(tables)}).items():
+    for subject, text in (warnings | {"filled": filled_warning(height), "material": " ".join(tables)}).items():
         if text:
             lines.append(f"{subject}: {' '.join(text.split())}")
     if lines:

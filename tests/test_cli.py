@@ -160,6 +160,17 @@ def test_new__writes_a_study_that_runs_and_brings_some_per_cent_into_contact(inv
         assert float(ds.contact_fraction[0]) < float(ds.contact_fraction[-1])
 
 
+def test_new__of_a_scan_that_misses_its_contact_warns(invoke, tmp_path):
+    heights = np.zeros((20, 24))
+    heights[9:11] = -1e-7  # the rest touches under any pressure
+    rv.save_scan(rv.from_array(heights, 1e-6), tmp_path / "plateaus.nc")
+    status, _, err = invoke("new", "plateaus.nc", "--contact", "10 %")
+    assert status == 0
+    (warned,) = err.splitlines()
+    assert "10 % requested" in warned
+    assert warned.partition("warning: ")[2] in (tmp_path / "plateaus-study.toml").read_text()
+
+
 def test_new__without_a_file_begins_with_an_example(invoke, tmp_path):
     status, out, err = invoke("new")
     assert (status, err) == (0, "")

@@ -180,10 +180,18 @@ def test_cycle_work__of_rows_at_the_ends_of_the_cycles_needs_no_steps(cycles):
 
 
 def test_warnings__are_one_attribute_of_one_line_each():
-    """A tilted scan: it repeats with a step, its slopes are steep, and its time step is too long."""
+    """A tilted scan: it repeats with a step, its slopes are steep, its time step is too long, and 5.2 % are filled."""
     rough = rv.self_affine((1e-3, 0.9e-3), (24, 21), hurst=0.8, rms_slope=0.4, rolloff=5e-4, seed=1)
     tilted = rough.copy(data=rough.values + 3e-4 * np.arange(24)[:, None] / 24)
     numerics = rv.Numerics(time_step=0.05)
     program = rv.Program().pressure(1e4, over=0.1)
-    ds = rv.simulate(tilted, RUBBER, program, boundary="periodic", numerics=numerics, progress=False)
-    assert {line.partition(": ")[0] for line in ds.attrs["warnings"].splitlines()} == {"border", "slope", "tolerance"}
+
+    def subjects(height):
+        ds = rv.simulate(height, RUBBER, program, boundary="periodic", numerics=numerics, progress=False)
+        return {line.partition(": ")[0] for line in ds.attrs["warnings"].splitlines()}
+
+    for missing, own in ((26, {"filled"}), (25, set())):  # of 504 points, with a limit of 5 %
+        holed = tilted.copy(deep=True)
+        holed.values.flat[: 19 * missing : 19] = np.nan
+        assert subjects(rv.fill(holed)) == {"border", "slope", "tolerance"} | own
+    assert "filled" in subjects(rv.mirror(rv.fill(tilted.where(tilted.x > 1e-4))))

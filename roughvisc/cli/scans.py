@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import roughvisc as rv
-from roughvisc.cli.group import PATH, quantity, say, say_path, screen
+from roughvisc.cli.group import PATH, complain, quantity, say, say_path, screen
 from roughvisc.errors import InputError
 
 if TYPE_CHECKING:
@@ -150,7 +150,10 @@ def new(file: Path | None, out: Path | None, contact: str, **options: Any) -> No
         source.write_bytes(shipped)
     height = _opened(source, options)
     found = rv.inspect(height)
-    write_text(out, starter_study(source, out, options, found, first_pressure(height, found, part)))
+    first = first_pressure(height, found, part)
+    write_text(out, starter_study(source, out, options, found, first))
+    if first.miss:
+        complain(f"warning: {first.miss}")
     console = screen()
     console.print(findings_table(found), "", sep="\n")
     if file is None:

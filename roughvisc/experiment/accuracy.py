@@ -44,6 +44,8 @@ _FREE = 0.25
 #: is of the order of the ratio of surface to projected area less one, ``slope^2 / 2``, here 4.5 % (K. L. Johnson,
 #: Contact Mechanics, CUP, 1985, section 4.1: slopes and strains are taken to be small).
 LARGEST_SLOPE = 0.3
+#: Largest share of filled points of a surface without a warning.
+LARGEST_FILLED = 0.05
 
 
 def memory_of(body: Body, program: Program, settings: Settings, **options: Any) -> Memory:
@@ -208,6 +210,17 @@ def loaded_depth(height: xr.DataArray, fraction: float) -> float:
     if count >= heights.size:
         return math.inf
     return float(heights.max() - np.partition(heights, -max(count, 1))[-max(count, 1)])
+
+
+def filled_warning(height: xr.DataArray) -> str:
+    """Return a warning if many points of a surface [m] were missing and are filled, else ''."""
+    share = float(height["filled"].mean()) if "filled" in height.coords else height.attrs.get("filled_fraction", 0.0)
+    if share <= LARGEST_FILLED:
+        return ""
+    return (
+        f"{100 * share:.2g} % of the surface is filled because its points are missing: contact there is not measured. "
+        "Crop to a part without holes, or state missing = 'absent' if they hold no material."
+    )
 
 
 def slope_warning(height: xr.DataArray, boundary: str, depth: float) -> str:

@@ -31,6 +31,8 @@ MOST_PRESSED, _TOLERANCE = 256, 1e-2
 #: Largest number of presses, accepted relative error of the contact, and largest factor between the pressure and the
 #: pressure of a theory: a surface with plateaus has more contact than in theory under any pressure.
 _PRESSES, _NEAR, _FARTHEST = 12, 0.01, 100.0
+#: Largest relative difference between contact and requested contact without a warning.
+_MISSED = 0.2
 #: Pressure on a flat scan. [Pa]
 _ON_FLAT = 1e3
 #: Boundary of the study, for a scan that represents a larger, nominally flat surface.
@@ -57,6 +59,16 @@ class FirstPressure(NamedTuple):
     contact: float
     late: float
     shape: tuple[int, int]
+
+    @property
+    def miss(self) -> str:
+        """Warning if the contact differs from the requested contact by more than a fifth, else ''."""
+        if abs(self.late - self.contact) <= _MISSED * self.contact:
+            return ""
+        requested = (
+            f"{100 * self.late:.2g} % of the area is in contact at the end, {100 * self.contact:.3g} % requested"
+        )
+        return f"{requested}: the scan is flat, or has plateaus, filled holes or stray points."
 
 
 def first_pressure(scan: xr.DataArray, found: Inspection, contact: float = CONTACT) -> FirstPressure:
@@ -138,6 +150,7 @@ def starter_study(
         study=Path(study).name,
         surface=surface_table(file, Path(study).parent, options, found.steps),
         contact=f"{100 * first.contact:.3g}",
+        miss=f"# {first.miss}\n" if first.miss else "",
         late=f"{100 * first.late:.2g}",
         pressed=f"{first.shape[0]} x {first.shape[1]}",
         pressure=written_quantity(first.pressure, "Pa"),

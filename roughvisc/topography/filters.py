@@ -16,6 +16,8 @@ from roughvisc.units import Quantity, number, quantities
 
 #: Memory of the windows that are sorted together. [byte]
 _MEMORY = 1 << 24
+#: Largest share of isolated points.
+_MOST_ISOLATED = 0.1
 
 
 def level(h: xr.DataArray, order: int = 1) -> xr.DataArray:
@@ -110,7 +112,8 @@ def mask_outliers(h: xr.DataArray, window: int = 9, threshold: float = 8.0) -> x
     Notes
     -----
     Instruments fail at steep flanks and often have spikes next to missing points. Mask these before :func:`fill`, which
-    would otherwise use the spikes as the rim of the hole.
+    would otherwise use the spikes as the rim of the hole. Isolated points inside a large hole are outliers whatever
+    their height, see :func:`isolated`.
     """
     if not isinstance(window, int) or window < 3 or window % 2 == 0:
         raise InputError(key="window", found=window, expected="an odd whole number of at least 3")
@@ -121,10 +124,37 @@ def mask_outliers(h: xr.DataArray, window: int = 9, threshold: float = 8.0) -> x
     faintest = 1e-12 * np.nanmax(np.abs(h.values))
     # 1.4826 median absolute deviations are the standard deviation of normal noise
     scale = np.fmax(_local_median(off, window), np.nanmedian(off)) * 1.4826
-    outlier = off > np.maximum(threshold * scale, faintest)
+    alone = isolated(np.isfinite(h.values), window)
+    outlier = (off > np.maximum(threshold * scale, faintest)) | alone
     count = int(outlier.sum())
     line = f"outliers masked: {count} points beyond {threshold:g} deviations from the median of {window} x {window}"
+    line += f", {alone.sum()} of them isolated" if alone.any() else ""
     return noted(like(h, np.where(outlier, np.nan, h.values)), line, outliers=count + h.attrs.get("outliers", 0))
+
+
+def isolated(present: np.ndarray, window: int = 9) -> np.ndarray:
+    """Return the mask of isolated points: groups of at most `window` points where most points are missing.
+
+    The window about such a point holds more missing points than others. If more than a tenth of all points are of this
+    kind, the points were measured far apart, and none counts as isolated.
+
+    Parameters
+    ----------
+    present : ndarray of bool, shape (nx, ny)
+        Points with a height. Points with a common side or corner belong to one group.
+    window : int
+        Side of the square window, and largest group. [points]
+    """
+    if present.all():
+        return np.zeros_like(present)
+    groups, _ = scipy.ndimage.label(present, np.ones((3, 3)))
+    alone = present & (np.bincount(groups.ravel())[groups] <= window) & in_large_holes(~present, window)
+    return alone & (alone.sum() <= _MOST_ISOLATED * present.sum())
+
+
+def in_large_holes(missing: np.ndarray, window: int = 9) -> np.ndarray:
+    """Return the mask of points in large holes, missing or not: most of the points around them are missing."""
+    return scipy.ndimage.uniform_filter(missing.astype(float), window, mode="nearest") > 0.5
 
 
 def fill(h: xr.DataArray) -> xr.DataArray:
@@ -141,7 +171,8 @@ def fill(h: xr.DataArray) -> xr.DataArray:
     -------
     xarray.DataArray
         Height without missing points. The coordinate ``filled`` over (x, y) marks the filled points; steps that
-        make another grid drop it. The attribute ``filled_points`` states their number. [m]
+        make another grid drop it. The attributes ``filled_points`` and ``filled_fraction`` state their number and
+        their share of the points. [m]
 
     Raises
     ------

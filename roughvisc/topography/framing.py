@@ -163,6 +163,7 @@ def combine(
     solid = all(h.attrs.get("missing") == "absent" or np.isfinite(values).all() for h, values in faces)
     attrs = {"recipe": None, "period": h1.attrs.get("period") if repeats else None}
     attrs["missing"] = "absent" if solid and np.isnan(both.values).any() else None
+    attrs["filled_fraction"] = max(h.attrs.get("filled_fraction", 0.0) for h in (h1, h2)) or None
     return noted(both, line + (f"; the second face: {about}" if about else ""), **attrs)
 
 

@@ -238,6 +238,7 @@ def noted(h: xr.DataArray, line: str, **attrs: Any) -> xr.DataArray:
     h = h.copy(deep=False)
     if "filled" in h.coords:
         attrs["filled_points"] = int(h["filled"].sum())
+        attrs["filled_fraction"] = attrs["filled_points"] / h.size
     stated = {**h.attrs, **attrs, "history": history}
     h.attrs = {name: value for name, value in stated.items() if value is not None}
     return h

@@ -12,20 +12,23 @@ import xarray as xr
 
 from roughvisc.topography.borders import JUMP, border_mismatch
 from roughvisc.topography.conditioning import STEPS
-from roughvisc.topography.filters import fill, gaussian_filter, level, mask_outliers
+from roughvisc.topography.filters import fill, gaussian_filter, in_large_holes, level, mask_outliers
+from roughvisc.topography.framing import crop
 from roughvisc.topography.grid import checked, nominal_area, rms_slope, spacing
 from roughvisc.topography.spectrum import psd
 from roughvisc.units import unit_for
 
-#: Side of the window that distinguishes large holes from small ones, in points, and share of the surface in large holes
-#: from which they are reported.
-_HOLE, _HOLES = 9, 0.01
+#: Share of the surface in large holes from which they are reported.
+_HOLES = 0.01
+#: Largest number of blocks along a side that are searched for a part without holes; least share of this part, and its
+#: fewest points along a side.
+_BLOCKS, _LEAST_PART, _FEWEST = 128, 0.1, 16
 #: Beyond this share of the points, spikes may be the surface itself.
 _MOST_SPIKES = 0.02
 #: Part of the plane in the rms height, and share of a quadratic form in its square, from which they are subtracted.
 _TILTED, _FORM = 0.01, 0.5
-#: Root mean square slope above which a unit or the spacing is probably wrong. [-]
-_STEEP = 1.0
+#: Root mean square slopes above and below which a unit or the spacing is probably wrong. [-]
+_STEEP, _FLAT = 1.0, 1e-4
 #: A white tail of the spectrum falls no steeper than this power of the wavevector over the last octave. If the spectrum
 #: is below this multiple of the tail, noise is at least as strong as the surface.
 _WHITE, _ABOVE = -1.5, 2.0
@@ -113,17 +116,24 @@ def inspect(h: xr.DataArray) -> Inspection:
     """
     h = checked(h, "inspect")
     findings: dict[str, Finding] = {}
-    missing, in_holes = int(h.isnull().sum()), float(_in_large_holes(np.isnan(h.values)).mean())
-    seen, advice = f"{missing} ({_percent(missing / h.size)})", "fill = true; the result marks the filled points"
-    if in_holes > _HOLES:
-        seen += f", {_percent(in_holes)} of the scan in holes wider than a few points"
-        advice = f'crop to a part without these holes, or missing = "absent" if there is no material; else {advice}'
-    step = {"fill": True} if missing else {}
-    findings["Missing points"] = Finding(seen, advice if missing else "", step, {"points": missing})
+    missing, holes = int(h.isnull().sum()), in_large_holes(np.isnan(h.values))
+    seen, advice, step = f"{missing} ({_percent(missing / h.size)})", list[str](), dict[str, Any]()
+    has_holes = bool(holes.mean() > _HOLES)
+    if has_holes and (part := _clear_part(h, holes)):
+        h, step["crop"] = crop(h, **part), part
+        limits = [f"{axis} from {_length(low)} to {_length(high)}" for axis, (low, high) in part.items()]
+        advice.append(f"crop to the largest part without these holes, {' and '.join(limits)}")
+    if gaps := int(h.isnull().sum()):
+        step["fill"] = True
+        advice.append("fill = true; the result marks the filled points")
+    if has_holes:
+        seen += f", {_percent(holes.mean())} of the scan in holes wider than a few points"
+        advice.append('if there is no material in the holes, missing = "absent" instead')
+    findings["Missing points"] = Finding(seen, "; ".join(advice), step, {"points": missing})
 
     levelled = level(h)
     masked = mask_outliers(levelled)
-    spikes = int(masked.isnull().sum()) - missing
+    spikes = int(masked.isnull().sum()) - gaps
     few = 0 < spikes <= _MOST_SPIKES * h.size
     kept = masked if few else levelled
     rms_levelled, rms = (float(np.nanstd(one.values)) for one in (levelled, level(kept)))
@@ -157,18 +167,51 @@ def inspect(h: xr.DataArray) -> Inspection:
     findings["Noise"] = noise = _noise(treated)
     treated = gaussian_filter(treated, noise.step["filter"]) if noise.step else treated
     slope = rms_slope(treated)
-    advice = "steeper than almost any measured surface: check unit, spacing and height_scale"
-    seen = f"{slope:.2g} rms after these steps"
-    findings["Slope"] = Finding(seen, advice * (slope > _STEEP), {}, {"rms_slope": slope})
+    kind = "steeper" if slope > _STEEP else "flatter" if slope < _FLAT else ""
+    advice = f"{kind} than almost any measured surface: check unit, spacing and height_scale" * bool(kind)
+    findings["Slope"] = Finding(f"{slope:.2g} rms after these steps", advice, {}, {"rms_slope": slope})
 
     proposed = {name: value for one in findings.values() for name, value in one.step.items()}
     steps = {name: proposed[name] for name in STEPS if name in proposed}
     return Inspection(findings, steps, boundary, nominal_area(treated), slope)
 
 
-def _in_large_holes(missing: np.ndarray) -> np.ndarray:
-    """Return the mask of points in large holes, missing or not: most of the points around them are missing."""
-    return scipy.ndimage.uniform_filter(missing.astype(float), _HOLE, mode="nearest") > 0.5
+def _clear_part(h: xr.DataArray, holes: np.ndarray) -> dict[str, list[float]]:
+    """Return limits of the largest rectangle without large holes, as for :func:`roughvisc.crop`. [m]
+
+    Empty if the rectangle is smaller than a tenth of the scan or than 16 points. The limits lie between two points, on
+    numbers of few digits.
+
+    Parameters
+    ----------
+    h : xarray.DataArray, dims (x, y)
+        Heights. [m]
+    holes : ndarray of bool, shape (nx, ny)
+        Points in large holes.
+    """
+    side = math.ceil(max(h.shape) / _BLOCKS)  # points along the side of a block
+    blocks = np.pad(holes, [(0, -n % side) for n in h.shape])
+    blocks = blocks.reshape(blocks.shape[0] // side, side, -1, side).any(axis=(1, 3))
+    clear_below, largest = np.zeros(blocks.shape[1], dtype=int), (0, (0, 0), (0, 0))
+    for row, has_hole in enumerate(blocks):
+        clear_below = np.where(has_hole, 0, clear_below + 1)  # clear blocks in each column, up to this row
+        open_columns: list[tuple[int, int]] = []  # first column and number of rows of each rectangle that may grow
+        for column, count in enumerate([*clear_below.tolist(), 0]):
+            first = column
+            while open_columns and open_columns[-1][1] >= count:
+                first, rows = open_columns.pop()
+                largest = max(largest, (rows * (column - first), (row + 1 - rows, row + 1), (first, column)))
+            open_columns.append((first, count))
+    limits = {}
+    for axis, d, n, (first, end) in zip("xy", spacing(h), h.shape, largest[1:], strict=True):
+        first, end = first * side, min(end * side, n)
+        if end - first < min(n, _FEWEST):
+            return {}
+        if end - first < n:
+            unit = 10.0 ** math.floor(math.log10(d / 2))
+            edges = float(h[axis][first]) - d / 2, float(h[axis][end - 1]) + d / 2
+            limits[axis] = [float(f"{round(edge / unit) * unit:.12g}") for edge in edges]
+    return limits if largest[0] * side**2 >= _LEAST_PART * h.size else {}
 
 
 def _noise(h: xr.DataArray) -> Finding:
@@ -187,7 +230,7 @@ def _noise(h: xr.DataArray) -> Finding:
     """
     gaps = h["filled"].values.astype(bool) if "filled" in h.coords else np.zeros(h.shape, dtype=bool)
     # points inside or at the edge of large holes are usually artefacts
-    gaps = gaps | scipy.ndimage.binary_dilation(_in_large_holes(gaps))
+    gaps = gaps | scipy.ndimage.binary_dilation(in_large_holes(gaps))
     rms, cell = float(h.values.std()), max(spacing(h))
     if min(h.shape) < 16 or gaps.mean() > _MOST_MISSING or not rms > 1e-12 * np.abs(h.values).max():
         seen = "not known: the scan is flat, smaller than 16 points, or has too many missing points"

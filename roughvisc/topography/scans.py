@@ -45,7 +45,7 @@ PROVENANCE = ("title", "description", "licence", "source", "instrument")
 #: Suffixes that :func:`save_scan` writes.
 WRITABLE = (".nc", ".x3p", ".sdf")
 #: Keys of a table ``[surface]`` with lengths, and the digits of these.
-_LENGTHS = {"spacing": 15, "grid": 15, "filter": 6, "crop": 6}
+_LENGTHS = {"spacing": 15, "grid": 15, "filter": 6, "crop": 12}
 
 
 @quantities(spacing="m", grid="m > 0", height_scale="1 > 0")

@@ -34,6 +34,7 @@ def test_first_pressure__brings_five_per_cent_into_contact(monkeypatch, hurst, m
     surface = condition(scan, found.steps)
     near = 0.02 if most > 128 else 0.1
     assert first.late == pytest.approx(0.05, rel=0.05), "the pressure has two digits"
+    assert not first.miss
     assert touching(surface, first.pressure, 1 / 3e6) == pytest.approx(first.late, rel=near)
 
 
@@ -41,9 +42,12 @@ def test_first_pressure__of_what_is_flat_or_has_plateaus():
     flat = rv.from_array(np.zeros((20, 24)), (1e-6, 1e-6))
     first = first_pressure(flat, inspect(flat))
     assert (first.pressure, first.late) == (1e3, 1.0)
+    assert first.miss
     heights = np.zeros((33, 33))
     heights[:, 11:22] = -1e-6  # the other two thirds touch under any pressure
     plateaus = rv.from_array(heights, (1e-6, 1e-6))
     first = first_pressure(plateaus, inspect(plateaus))
     assert first.pressure > 0
     assert first.late > 0.6
+    assert "5 % requested" in first.miss
+    assert not first_pressure(plateaus, inspect(plateaus), 0.8).miss

@@ -111,6 +111,24 @@ def test_mask_outliers__finds_spikes_and_nothing_else():
     assert mask_outliers(h).attrs["outliers"] == 0
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_mask_outliers__finds_isolated_points_in_holes_at_any_height(turned):
+    """Stray points of a confocal instrument: some have the height of the surface. The rim of the hole is no outlier."""
+    h = rough((61, 54))
+    h = h.transpose("y", "x").rename(x="y", y="x") if turned else h
+    i, j = np.indices(h.shape)
+    hole = np.hypot(i - 20, j - 22) < 15
+    stray = hole & (i % 6 == 0) & (j % 5 == 0) & (np.hypot(i - 20, j - 22) < 12)
+    assert stray.sum() > 10
+    holed = h.where(~hole | stray)
+    for values in (holed, holed + 1e-4 * stray, holed - 1e-4 * stray):
+        done = mask_outliers(values)
+        np.testing.assert_array_equal(np.isnan(done.values), hole)
+        assert done.attrs["outliers"] == stray.sum()
+    sparse = h.where((i % 3 == 0) & (j % 3 == 0))  # a coarse scan on a fine lattice: all of its points are far apart
+    assert mask_outliers(sparse).attrs["outliers"] == 0
+
+
 def test_fill__keeps_the_points_present_and_says_what_it_did():
     h = rough(missing=0.1)
     done = fill(h)

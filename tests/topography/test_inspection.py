@@ -78,21 +78,56 @@ def test_noise__is_not_seen_where_the_spectrum_falls_all_the_way():
     assert "filter" not in found.steps
 
 
-def test_missing_points__are_filled_and_large_holes_named():
+@pytest.mark.parametrize("transposed", [False, True])
+@pytest.mark.parametrize("cells", [(1e-6, 1e-6), (1e-6, 4e-6)])
+def test_missing_points__are_filled_and_large_holes_cropped_away(transposed, cells):
+    """Advice, steps and card agree; spikes and stray points next to the missing ones are found too."""
     values = SMOOTH.values.copy()
     values[70:, :] = np.nan
-    values[10, 10] = values[30, 40] = np.nan
-    found = inspect(with_values(values))
+    values[:30, 60:] = np.nan
+    values[90, 10:80:6] = 9e-6  # stray points in the hole
+    few = [(10, 10), (30, 40)]
+    for place in few:
+        values[place] = np.nan
+    spikes = [(10, 11), (50, 20)]
+    for place in spikes:
+        values[place] += 5e-6
+    values, cells = (values.T, cells[::-1]) if transposed else (values, cells)
+    scan = from_array(values, cells)
+    found = inspect(scan)
     missing = found.findings["Missing points"]
-    assert missing.values["points"] == 26 * 80 + 2
+    assert missing.values["points"] == int(np.isnan(values).sum())
     assert "holes" in missing.seen
-    treated = condition(with_values(values), found.steps)
-    assert int(treated.filled.sum()) == missing.values["points"]
-    values[70:, :] = SMOOTH.values[70:, :]
+    assert "crop" in missing.advice
+    assert found.findings["Spikes"].values["points"] == len(spikes)
+    treated = condition(scan, found.steps)
+    assert treated.shape == ((60, 70) if transposed else (70, 60)), "larger than the other part of 40 x 80 points"
+    assert int(treated.filled.sum()) == len(few) + len(spikes)
+    assert found.area == pytest.approx(treated.size * cells[0] * cells[1])
+    assert float(np.abs(treated).max()) < 1e-6, "neither spikes nor stray points are left"
+
+
+def test_missing_points__without_a_part_free_of_holes_are_filled():
+    values = SMOOTH.values.copy()
+    i, j = np.indices(values.shape)
+    values[(np.abs(i % 24 - 12) < 7) & (np.abs(j % 24 - 12) < 7)] = np.nan
+    found = inspect(with_values(values))
+    assert found.steps["fill"] is True
+    assert "crop" not in found.steps
+    assert "crop" not in found.findings["Missing points"].advice
+    values = SMOOTH.values.copy()
+    values[10, 10] = values[30, 40] = np.nan
     few = inspect(with_values(values)).findings["Missing points"]
     assert few.values["points"] == 2
     assert "holes" not in few.seen
     assert few.step == {"fill": True}
+
+
+@pytest.mark.parametrize(("factor", "is_doubtful"), [(1e-3, True), (1, False), (1e3, True)])
+def test_slope__of_heights_in_a_wrong_unit_is_doubtful(factor, is_doubtful):
+    slope = inspect(with_values(SMOOTH.values * factor)).findings["Slope"]
+    assert bool(slope.advice) == is_doubtful
+    assert slope.values["rms_slope"] == pytest.approx(factor * float(rv.parameters(SMOOTH).Sdq), rel=0.01)
 
 
 @pytest.mark.parametrize(("share", "off"), [(0.004, 0.1), (0.1, 0.35)])
