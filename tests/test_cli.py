@@ -142,6 +142,25 @@ def test_scan__says_what_is_there_and_draws_it(invoke, tmp_path, scan_file):
     assert (tmp_path / "a" / "b.pdf").exists()
 
 
+@pytest.mark.parametrize("name", ["tilted.png", "own.pdf"])
+def test_scan__replaces_its_own_picture_and_keeps_any_other(name, invoke, tmp_path, scan_file):
+    """Another spacing changes the picture; a file of another origin stays."""
+    command = ["scan", scan_file] if name == "tilted.png" else ["scan", scan_file, "--plot", name]
+    assert f"Picture: {name}\n" in invoke(*command)[1]
+    first = (tmp_path / name).read_bytes()
+    assert f"Picture: {name}\n" in invoke(*command, "--spacing", "2um")[1]
+    assert (tmp_path / name).read_bytes() != first
+    (tmp_path / name).write_bytes(b"mine")
+    status, out, err = invoke(*command)
+    assert (tmp_path / name).read_bytes() == b"mine"
+    if name == "tilted.png":
+        assert (status, err) == (0, "")
+        assert "kept" in out
+    else:
+        assert (status, out) == (2, "")
+        assert name in err
+
+
 def test_new__writes_a_study_that_runs_and_brings_some_per_cent_into_contact(invoke, tmp_path, scan_file):
     status, out, err = invoke("new", scan_file)
     assert (status, err) == (0, "")

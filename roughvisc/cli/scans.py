@@ -39,6 +39,8 @@ def _reading(command: Any) -> Any:
     return command
 
 
+#: Name of the command in the metadata of its pictures, which it replaces.
+_MAKER = "roughvisc scan"
 #: Question for an argument that a file lacks, and the type of the answer.
 _QUESTIONS: dict[str, tuple[str, Any]] = {
     "unit": ("Unit of x, y and heights (such as um)", str),
@@ -79,7 +81,7 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, **op
 
     Prints size, channels, missing points and areal parameters; then spikes, tilt, form, borders and noise, each with
     a recommendation; then a [surface] table to paste into a study. Parameters and picture refer to the scan without
-    its mean plane. FILE is an instrument file or a surface card.
+    its mean plane. A picture of an earlier scan is replaced. FILE is an instrument file or a surface card.
 
     \b
     Example:
@@ -87,24 +89,27 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, **op
       roughvisc scan focus_variation.x3p --to scan.nc --card scan.toml
     """
     from roughvisc.cli.tables import findings_table, scan_table
-    from roughvisc.plot.save import write_figure
+    from roughvisc.plot.save import is_made_by, write_figure
     from roughvisc.study.storage.folder import atomic_write, write_text
     from roughvisc.topography.scans import card_text, known_suffix, surface_table
 
     height = _opened(file, options)
     if to:
         known_suffix(to)
+    picture = plot or Path(f"{file.stem}.png")
+    is_replaced = is_made_by(picture, _MAKER)
     for out in filter(None, (plot, to, card)):
-        if out.exists():
+        if out.exists() and not (out is plot and is_replaced):
             raise InputError(f"{out}: already exists: expected another name")
     levelled, found = rv.level(height), rv.inspect(height)
     text = card_text(file, card.parent, options, found.steps) if card else ""
     console = screen()
     console.print(scan_table(height, rv.parameters(levelled), file.name), "", findings_table(found), "", sep="\n")
     say(console, surface_table(file, Path(), options, found.steps))
-    picture = plot or Path(f"{file.stem}.png")
-    if not picture.exists():
-        say_path(console, "Picture", write_figure(rv.plot.surface(levelled), picture))
+    if is_replaced or not picture.exists():
+        say_path(console, "Picture", write_figure(rv.plot.surface(levelled), picture, _MAKER))
+    else:
+        say_path(console, "Picture kept, because roughvisc scan did not make it", picture)
     if to:
         with atomic_write(to) as temporary:
             rv.save_scan(height, temporary)

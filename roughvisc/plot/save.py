@@ -39,6 +39,8 @@ FIGURES: dict[str, tuple[Callable[[xr.Dataset], Figure], tuple[str, ...], str]] 
 }
 #: Resolution of pictures. [1/inch]
 DPI = 150
+#: Key of the metadata that names the program which made a picture, by format.
+_MAKER = {"png": "Software", "pdf": "Creator", "svg": "Creator"}
 #: Figures that are drawn unless all are requested.
 DEFAULT = ("friction", "history", "maps", "leakage")
 
@@ -51,7 +53,7 @@ def figures_of(dataset: xr.Dataset, names: Collection[str] | None = None) -> Ite
 
 
 @matplotlib.rc_context(style.STYLE)
-def write_figure(figure: Figure, path: Path) -> Path:
+def write_figure(figure: Figure, path: Path, maker: str = "") -> Path:
     """Write a figure to a file in the format of its suffix, complete or not at all.
 
     Parameters
@@ -60,6 +62,8 @@ def write_figure(figure: Figure, path: Path) -> Path:
         Figure to write.
     path : Path
         File to write.
+    maker : str
+        Program to name in the metadata of a .png, .pdf or .svg, see :func:`is_made_by`.
 
     Raises
     ------
@@ -69,9 +73,15 @@ def write_figure(figure: Figure, path: Path) -> Path:
     kind = path.suffix.lstrip(".") or "png"
     if kind not in figure.canvas.get_supported_filetypes():
         raise InputError(f"{path}: is not a picture format: expected one of .png, .pdf, .svg")
+    about = {_MAKER[kind]: maker} if maker and kind in _MAKER else None
     with atomic_write(path) as temporary:
-        figure.savefig(temporary, format=kind, dpi=DPI)
+        figure.savefig(temporary, format=kind, dpi=DPI, metadata=about)
     return path
+
+
+def is_made_by(path: Path, maker: str) -> bool:
+    """Return whether a file names its maker, as :func:`write_figure` writes it."""
+    return path.is_file() and maker.encode() in path.read_bytes()
 
 
 def save_figures(dataset: xr.Dataset, folder: Any, stem: str, names: Collection[str] | None = None) -> list[Path]:
