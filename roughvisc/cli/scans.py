@@ -33,7 +33,9 @@ def _reading(command: Any) -> Any:
         click.option("--no-data", type=float, help="Number in the file that marks a missing point: -9999."),
         quantity("--grid", "LENGTH", "Side of the cells into which points x, y, z are sorted: 2um."),
         click.option("--spacing", type=_sides, metavar="LENGTH", help="Distance between points: 1um, or 1um,2um."),
-        click.option("--unit", help="Unit of length, if the file states none: um."),
+        click.option(
+            "--unit", help="Unit of length, if the file states none: um, or mm,um for x and y in mm, heights in um."
+        ),
     ):
         command = option(command)
     return command

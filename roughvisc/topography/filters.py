@@ -16,6 +16,8 @@ from roughvisc.units import Quantity, number, quantities
 
 #: Memory of the windows that are sorted together. [byte]
 _MEMORY = 1 << 24
+#: Largest shift of a limit by rounding, relative to it.
+_ROUNDING = 1e-9
 #: Largest share of isolated points.
 _MOST_ISOLATED = 0.1
 
@@ -226,7 +228,7 @@ def gaussian_filter(h: xr.DataArray, cutoff: Quantity, keep: Literal["long", "sh
     h = checked(h, "gaussian_filter")
     sides = spacing(h)
     longest = max(side * count for side, count in zip(sides, h.shape, strict=True))
-    cutoff = number(cutoff, "m", "cutoff", least=3 * max(sides), most=longest)
+    cutoff = number(cutoff, "m", "cutoff", least=3 * max(sides) * (1 - _ROUNDING), most=longest * (1 + _ROUNDING))
     require_heights(h, "gaussian_filter")
     mean, present = np.nanmean(h.values), np.isfinite(h.values)
     long, share = np.where(present, h.values - mean, 0.0), present.astype(float)

@@ -14,7 +14,7 @@ from roughvisc.topography.borders import MIRRORED, is_periodic, period_of
 from roughvisc.topography.filters import membrane
 from roughvisc.topography.grid import checked, labelled, like, noted, spacing, with_coordinates
 from roughvisc.topography.spectrum import resample
-from roughvisc.units import Quantity, number, quantities
+from roughvisc.units import Quantity, format_quantity, number, quantities
 
 #: Largest shift of a cell border or a centre by rounding, relative to the cell.
 _ON_BORDER = 1e-9
@@ -54,8 +54,10 @@ def crop(
     part = h.sel({axis: slice(low - off[axis], high + off[axis]) for axis, (low, high) in chosen.items()})
     for axis, limits in chosen.items():
         if part.sizes[axis] < 2:
-            held = f"{float(h[axis][0]):.6g} to {float(h[axis][-1]):.6g}"
-            raise InputError(key=axis, found=limits, expected=f"limits that hold at least two cells of {held} m")
+            first, last = (format_quantity(float(h[axis][end]), "m") for end in (0, -1))
+            raise InputError(
+                key=axis, found=limits, expected=f"limits that hold at least two cells of {first} to {last}"
+            )
     nx, ny = part.shape
     line = f"cropped to {nx} x {ny} cells: x {chosen.get('x', 'all')}, y {chosen.get('y', 'all')} m"
     return noted(part, line, **({} if part.shape == h.shape else {"period": None}))

@@ -254,7 +254,7 @@ def _noise(h: xr.DataArray) -> Finding:
     noisy = float(slopes[q > 2 * np.pi / cutoff].sum() / slopes.sum())
     seen = f"{_length(noise)} rms: waves below {_length(cutoff)} are noise, {_percent(noisy)} of the mean square slope"
     is_harmful = noisy > _HARMLESS and cutoff >= 3 * cell
-    step = {"filter": max(float(f"{cutoff:.2g}"), 3.001 * cell)} if is_harmful else {}
+    step = {"filter": max(float(f"{cutoff:.2g}"), _rounded_up(3 * cell))} if is_harmful else {}
     values = {"rms": noise, "floor": True, "wavelength": cutoff, "noisy_slopes": noisy}
     return Finding(seen, "filter out these wavelengths" * is_harmful, step, values)
 
@@ -262,6 +262,12 @@ def _noise(h: xr.DataArray) -> Finding:
 def _short_waves(h: xr.DataArray, gaps: np.ndarray) -> xr.Dataset:
     """Return the complete rings of the power spectrum; a membrane fills the gaps."""
     return psd(fill(h.where(~gaps)), "hann").sel(wavevector=slice(None, np.pi / max(spacing(h))))
+
+
+def _rounded_up(value: float) -> float:
+    """Return the next number of three digits that is not smaller, but for rounding."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return float(f"{math.ceil(value / unit - 1e-9) * unit:.12g}")
 
 
 def _length(value: float) -> str:

@@ -10,7 +10,7 @@ import math
 import textwrap
 import threading
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from roughvisc.topography.formats import TOP_FIRST, open_file, orientation
 from roughvisc.topography.formats.scan_file import Channel, ScanFile
 from roughvisc.topography.grid import MOST_CELLS, checked, in_metres, labelled, noted, pair, with_coordinates
 from roughvisc.topography.grid import spacing as cell_sides
-from roughvisc.units import Quantity, number, quantities
+from roughvisc.units import Quantity, format_quantity, number, quantities
 
 #: Largest side, finest spacing and largest distance of a height from zero. [m] Scans of 150 mm exist; absolute heights
 #: of 76 mm too.
@@ -107,23 +107,42 @@ def _labelled(file: ScanFile, channel: Channel, given: Mapping[str, Any]) -> xr.
 
 def _metres(channel: Channel, given: Mapping[str, Any]) -> tuple[float, float]:
     """Return the metres per unit of x and y, and per unit of the heights, from the file or else from the options."""
-    unit, stated = given.get("unit"), channel.unit
+    lateral, vertical = _units(given.get("unit"))
+    stated = channel.unit
     is_sized = channel.kind == "points" or bool(channel.positions) or all(side > 0 for side in channel.spacing or [0.0])
     needs_unit = stated is None or (is_sized and channel.lateral_unit is None and "spacing" not in given)
     lacking = {}
-    if needs_unit and unit is None:
+    if needs_unit and lateral is None:
         lacking["unit"] = 'unit = "um"'
     if not is_sized and "spacing" not in given:
         lacking["spacing"] = 'spacing = "1 um"'
     for key in lacking:
         expected = f"{' and '.join(lacking.values())}, or another"
         raise InputError(f"it states no {' and no '.join(lacking)}: expected {expected}", key=key, expected=expected)
-    if unit is not None and not needs_unit:
-        factor = number(f"1 {unit}", "m", "unit") / number(f"1 {stated}", "m")
+    if vertical is not None and stated is not None and not (needs_unit and vertical == lateral):
+        factor = number(f"1 {vertical}", "m", "unit") / number(f"1 {stated}", "m")
         if not math.isclose(factor, 1.0):
-            expected = f"the unit of the file, {stated!r}, or height_scale = {factor:.6g} if its heights are in {unit}"
-            raise InputError(key="unit", found=unit, expected=expected)
-    return number(f"1 {channel.lateral_unit or unit or 'm'}", "m", "unit"), number(f"1 {stated or unit}", "m", "unit")
+            wrong = f"height_scale = {factor:.6g} if its heights are in {vertical}"
+            raise InputError(key="unit", found=given["unit"], expected=f"the unit of the file, {stated!r}, or {wrong}")
+    if lateral != vertical and channel.lateral_unit is not None:
+        factor = number(f"1 {lateral}", "m", "unit") / number(f"1 {channel.lateral_unit}", "m")
+        if not math.isclose(factor, 1.0):
+            raise InputError(
+                key="unit", found=given["unit"], expected=f"x and y in {channel.lateral_unit}, as in the file"
+            )
+    xy, z = channel.lateral_unit or lateral or "m", stated or vertical
+    return number(f"1 {xy}", "m", "unit"), number(f"1 {z}", "m", "unit")
+
+
+def _units(unit: str | Sequence[str] | None) -> tuple[str | None, str | None]:
+    """Return the units of x and y, and of the heights, from a text such as "um" or "mm,um", or from a pair."""
+    if unit is None:
+        return None, None
+    parts = unit.split(",") if isinstance(unit, str) else unit if isinstance(unit, list | tuple) else ()
+    if not 0 < len(parts) <= 2 or not all(isinstance(one, str) and one.strip() for one in parts):
+        expected = 'a unit of length, or those of x and y and of heights, such as "mm,um"'
+        raise InputError(key="unit", found=unit, expected=expected)
+    return parts[0].strip(), parts[-1].strip()
 
 
 def _without_no_data(values: np.ndarray, no_data: float | None, complaints: list[str]) -> np.ndarray:
@@ -269,8 +288,9 @@ def laid_out(
             complaints.append(f"{empty} of {heights.size} cells of the grid hold no point")
         return heights, (side, side)
     if (found := lattice(points)) is None:
-        proposed = 2e6 * metres * math.sqrt(spread[0] * spread[1] / len(points))
-        text = f'its {len(points)} points lie on no regular lattice: expected grid = "{proposed:.2g} um", or similar'
+        side = float(f"{2 * metres * math.sqrt(spread[0] * spread[1] / len(points)):.1g}")
+        proposed = f'grid = "{format_quantity(side, "m").replace("µ", "u")}"'
+        text = f"its {len(points)} points lie on no regular lattice: expected {proposed}, or similar"
         raise InputError(text, key="grid", expected="the side of the cells into which the points are sorted")
     return found
 

@@ -54,7 +54,7 @@ def open_scan(
     *,
     format: str | None = None,
     channel: int | str | None = None,
-    unit: str | None = None,
+    unit: str | tuple[str, str] | None = None,
     spacing: Quantity | tuple[Quantity, Quantity] | None = None,
     grid: Quantity | None = None,
     no_data: float | None = None,
@@ -72,8 +72,9 @@ def open_scan(
     channel : int or str, optional
         Number or name of the channel. Default: the height channel, or the default of the library if there are several;
         the attribute ``other_channels`` then lists the others.
-    unit : str, optional
-        Unit of length in a file that states none, such as ``"um"``.
+    unit : str or pair of str, optional
+        Unit of length in a file that states none, such as ``"um"``; or two, of x and y and of the heights, such as
+        ``"mm,um"``.
     spacing : float or str, or a pair, optional
         Cell sides (dx, dy), instead of those in the file. [m]
     grid : float or str, optional
@@ -84,8 +85,7 @@ def open_scan(
         least 999 in size, occurs at four points or more, and is further from all others than ten times their range; a
         warning reports it.
     height_scale : float, optional
-        Factor of the heights, for a file that states a wrong unit (1e-6 if micrometres are labelled as metres), or if
-        x and y have another unit: for points in mm, mm, um use ``unit="mm", height_scale=1e-3``. [-]
+        Factor of the heights, for a file that states a wrong unit: 1e-6 if micrometres are labelled as metres. [-]
 
     Returns
     -------

@@ -239,8 +239,9 @@ def test_points__near_a_lattice_are_that_lattice(jitter, tmp_path):
 
 def test_points__off_any_lattice_ask_for_a_grid_and_count_empty_cells(tmp_path):
     np.savetxt(tmp_path / "p.csv", points(jitter=0.3), delimiter=",")
-    with refused("grid"):
+    with refused("grid") as caught:
         open_scan(tmp_path / "p.csv", unit="um")
+    assert 'grid = "5 um"' in str(caught.value), "twice the mean distance, sqrt(6) um, in a round number"
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         h = open_scan(tmp_path / "p.csv", unit="um", grid="4 um")

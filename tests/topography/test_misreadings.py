@@ -77,11 +77,16 @@ def test_several_heights__the_chosen_one_is_named_and_the_others_listed(tmp_path
 def test_points__that_state_no_unit_need_one(tmp_path):
     path = write_xyz(tmp_path / "scan.xyz")
     assert "expected unit" in refusal(path)
-    h = open_scan(path, unit="mm", height_scale=1e-3)  # x and y in mm, z in um
-    np.testing.assert_allclose(h, 1e-6 * tilted(missing=False), rtol=1e-9)
-    np.testing.assert_allclose(spacing(h), np.multiply(CELL, 1e-3))
+    (tmp_path / "card.toml").write_text('file = "scan.xyz"\nunit = "mm,um"\n')
+    ways = [{"unit": "mm", "height_scale": 1e-3}, {"unit": "mm, um"}, {"unit": ("mm", "um")}, {"unit": ["mm", "um"]}]
+    for h in (open_scan(tmp_path / "card.toml"), *(open_scan(path, **options) for options in ways)):
+        np.testing.assert_allclose(h, 1e-6 * tilted(missing=False), rtol=1e-9)
+        np.testing.assert_allclose(spacing(h), np.multiply(CELL, 1e-3))
     with refused("unit", "1 s"):
         open_scan(path, unit="s")
+    for wrong in ("", "mm,", "mm,um,um", (), ("mm", 3), 3):
+        with refused("unit", wrong):
+            open_scan(path, unit=wrong)
 
 
 def test_unit__in_a_grid_file_counts_where_it_states_none(tmp_path):
@@ -94,9 +99,16 @@ def test_unit__in_a_grid_file_counts_where_it_states_none(tmp_path):
     np.testing.assert_allclose(spacing(found), CELL)
     bare.assign_attrs(units="um").to_netcdf(path)
     np.testing.assert_allclose(open_scan(path, unit="mm"), 1e-6 * tilted())
+    np.testing.assert_allclose(open_scan(path, unit="mm,um"), 1e-6 * tilted())
+    with refused("unit", "mm,nm"):
+        open_scan(path, unit="mm,nm")
     h.to_netcdf(path)
     assert "height_scale = 1e-06" in refusal(path, unit="um")
-    np.testing.assert_array_equal(open_scan(path, unit="m"), h)
+    for unit in ("m", "m,m"):
+        np.testing.assert_array_equal(open_scan(path, unit=unit), h)
+    for wrong in ("um,m", "m,um"):
+        with refused("unit", wrong):
+            open_scan(path, unit=wrong)
 
 
 def test_header__that_states_the_unit_of_x_and_y_alone(tmp_path):

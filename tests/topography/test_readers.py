@@ -113,6 +113,23 @@ def test_refusal__of_what_only_poses_as_a_scan(suffix, content, tmp_path):
     refusal(path)
 
 
+@pytest.mark.parametrize("suffix", ["stl", "PLY", "png", "jpg", "h5-jpk", "topostats", "xls", "xlsx"])
+def test_refusal__of_files_without_a_map_says_what_to_export(suffix, tmp_path):
+    (tmp_path / f"a.{suffix}").write_bytes(b"solid own")
+    with refused("format", f".{suffix}") as caught:
+        open_scan(tmp_path / f"a.{suffix}")
+    assert "expected" in str(caught.value)
+
+
+@real
+def test_refusal__of_digital_surf_with_intensities_names_their_unit(tmp_path):
+    content = bytearray((SCANS / "sur-2.sur").read_bytes())
+    for place in (212, 260):  # units of the step of z, and of z
+        content[place : place + 16] = b"%".ljust(16)
+    (tmp_path / "intensity.sur").write_bytes(content)
+    assert "'%'" in refusal(tmp_path / "intensity.sur")
+
+
 def test_refusal__all_points_are_missing(tmp_path):
     from_array(tilted(), CELL).copy(data=np.full(SHAPE, np.nan)).to_netcdf(tmp_path / "scan.nc")
     assert "all 117 points are missing" in refusal(tmp_path / "scan.nc")
@@ -122,6 +139,7 @@ def test_supported_formats__names_those_of_all_libraries():
     known = supported_formats()
     assert {"x3p", "sdf", "nc", "al3d", "sur", "frt", "opd", "di", "wsxm", "asc", "xyz", "nms"} <= set(known)
     assert known["wsxm"] == ("cur", "stp", "tom", "top")
+    assert known["jpk"] == ("jpk", "jpk-qi-image")
     assert len(known) >= 40
 
 

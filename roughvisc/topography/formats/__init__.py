@@ -6,6 +6,7 @@ A reader takes a path and returns a :class:`ScanFile`: the channels of the file,
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -32,6 +33,17 @@ _FORMATS: dict[str, tuple[Sequence[str], Callable[[Path], ScanFile]]] = {
 }
 #: Formats to try, in this order, for suffixes that are also used for other content.
 _SHARED = {"dat": ("metropro", "txt"), "h5": ("nc", "h5")}
+#: Suffix -> kind of a file that no reader reads or that holds no heights, and what to export instead.
+_MESH = "a mesh of triangles: expected its vertices as text, x, y and z on each line (.xyz), with unit and grid"
+_PICTURE = "a picture without heights: expected the heights, such as .x3p, .sur or a text matrix, from the instrument"
+_SHEET = "a spreadsheet: expected its sheet of heights as .csv, with unit and spacing"
+_EXPORTS = {
+    **dict.fromkeys(("stl", "ply", "obj"), _MESH),
+    **dict.fromkeys(("png", "jpg", "jpeg", "bmp", "gif"), _PICTURE),
+    **dict.fromkeys(("xls", "xlsx", "ods"), _SHEET),
+    "h5-jpk": "a video of a JPK instrument: expected one height image, saved as .jpk or as text",
+    "topostats": "a result of TopoStats: expected its array 'image' as .npy, with unit = \"nm\" and the spacing",
+}
 #: Formats whose reader returns the top line of the map first, and the evidence. For the first two, it is a feature in a
 #: real file; for the others, mostly the agreement of two programs.
 _GWYDDION = "not verified: the reader matches the map of Gwyddion, whose first line is the top one"
@@ -54,7 +66,7 @@ _TAKEN = "not verified: rows are taken to run along x and the first to be y = 0;
 
 def open_file(path: Path, format: str | None) -> ScanFile:
     """Read the header of a scan file; find its format by name, or else by suffix."""
-    names, failures = _formats_of(path) if format is None else (format,), []
+    names, failures = _formats_of(path) if format is None else (format,), list[str]()
     for name in names:
         default = partial(binary.read_with_surface_topography, format=name)
         try:
@@ -63,8 +75,15 @@ def open_file(path: Path, format: str | None) -> ScanFile:
                 return file
         except InputError:
             raise
-        except Exception as error:  # noqa: BLE001 - readers raise many types, such as struct.error and KeyError
+        except Exception as error:  # readers raise many types, such as struct.error and KeyError
+            if unit := re.match(r"Unknown unit '(.*)'", str(error)):
+                expected = "a map of heights, and no image of intensity or of another quantity"
+                raise InputError(
+                    f"it holds values in {unit[1]!r}, which is not a length: expected {expected}"
+                ) from error
             failures.append(f"as {name}: {str(error) or type(error).__name__}")
+    if format is None and (export := _EXPORTS.get(_suffix(path))):
+        raise InputError(f"it is {export}", key="format", found=path.suffix)
     raise ValueError("; ".join(failures))
 
 
@@ -97,21 +116,29 @@ def supported_formats() -> dict[str, Sequence[str]]:
         from SurfaceTopography.IO import readers  # slow to import
     known = {reader.format(): tuple(reader.file_extensions() or ()) for reader in readers}
     known["di"] += ("di", "000 to 999")
+    known["jpk"] += ("jpk-qi-image",)
     known |= {name: theirs for name, (theirs, _) in _FORMATS.items()}
     return dict(sorted(known.items()))
 
 
 def _formats_of(path: Path) -> Sequence[str]:
     """Return the formats to try for the suffix of a file, in order."""
-    suffix = path.suffix.lower().removeprefix(".")
+    suffix = _suffix(path)
     if quick := [name for name, (theirs, _) in _FORMATS.items() if suffix in theirs][-1:] or _SHARED.get(suffix):
         return quick
     known = supported_formats()
     wanted = "000 to 999" if len(suffix) == 3 and suffix.isdigit() else suffix
     if found := [name for name, theirs in known.items() if wanted in theirs]:
         return found
+    if suffix in _EXPORTS:
+        raise InputError(f"it is {_EXPORTS[suffix]}", key="format", found=path.suffix)
     listed = ", ".join(sorted({one for theirs in known.values() for one in theirs}))
     raise InputError(f"the suffix {path.suffix!r} is not known: expected format, or a suffix of {listed}", key="format")
+
+
+def _suffix(path: Path) -> str:
+    """Return the suffix of a file in lower case, without the dot."""
+    return path.suffix.lower().removeprefix(".")
 
 
 def orientation(format: str) -> str:
