@@ -116,7 +116,8 @@ def combine(
 
     The second face is centred on the first. The sum is on the cells of the first that the second covers completely. If
     the cells of the second face are smaller, it is first resampled to cells of the same size (:func:`resample`). A
-    cubic spline between its cell centres then gives its heights at the cell centres of the first face.
+    cubic spline between its cell centres then gives its heights at the cell centres of the first face, unless the cell
+    centres coincide.
 
     Parameters
     ----------
@@ -209,6 +210,10 @@ def _on_common_cells(h1: xr.DataArray, h2: xr.DataArray, apart: tuple[float, flo
             )
         kept[axis] = covered
         at.append(np.clip(lower[covered] + side / 2 - 0.5, 0, n2 - 1))  # new centres, in numbers of old cells
+
+    nodes = [np.round(places).astype(int) for places in at]
+    if all(np.abs(places - node).max() <= _ON_BORDER for places, node in zip(at, nodes, strict=True)):
+        return h1.isel(kept), h2.values[np.ix_(*nodes)]  # the cells of both faces coincide: no rounding by a spline
 
     def laid(values: np.ndarray, order: int) -> np.ndarray:
         degrees = [min(order, n - 1) for n in values.shape]

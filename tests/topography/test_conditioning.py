@@ -247,9 +247,10 @@ def test_rotate90__turns_counter_clockwise():
 
 def test_combine__adds_faces_on_equal_cells():
     a, b = rough(missing=0.05), rough(missing=0.05, seed=1)
-    np.testing.assert_allclose(combine(a, b), a.values + b.values, rtol=0, atol=1e-20)
-    np.testing.assert_allclose(combine(a, b, flip="y"), a.values + b.values[:, ::-1], rtol=0, atol=1e-20)
-    np.testing.assert_allclose(combine(a, invert(a)).fillna(0), 0, atol=1e-20)
+    np.testing.assert_array_equal(combine(a, b), a.values + b.values)
+    np.testing.assert_array_equal(combine(a, b, flip="y"), a.values + b.values[:, ::-1])
+    np.testing.assert_array_equal(combine(a, b, "x", offset=(2 * CELL[0], 0.0)), a.values[2:] + b.values[:1:-1])
+    np.testing.assert_array_equal(combine(a, invert(a)).fillna(0), 0)
     np.testing.assert_array_equal(np.isnan(combine(a, b)), np.isnan(a) | np.isnan(b))
 
 
