@@ -235,7 +235,8 @@ def _noise(h: xr.DataArray) -> Finding:
     if min(h.shape) < 16 or gaps.mean() > _MOST_MISSING or not rms > 1e-12 * np.abs(h.values).max():
         seen = "not known: the scan is flat, smaller than 16 points, or has too many missing points"
         return Finding(seen, "", {}, {})
-    waves = _short_waves(h, gaps)
+    spectrum = _spectrum(h, gaps)
+    waves = _complete(spectrum, h)
     q, density = waves["wavevector"].values, waves["psd"].values
     octave, area = q > q[-1] / 2, math.prod(spacing(h))
     tail = float(np.median(density[octave]))
@@ -244,14 +245,15 @@ def _noise(h: xr.DataArray) -> Finding:
     floor = bool(power > _WHITE and below.size and below[0] > 0 and math.sqrt(tail / area) > _ROUNDING * rms)
     if floor and gaps.any():
         more = gaps | np.roll(gaps, [n // 2 for n in gaps.shape], (0, 1))
-        floor = float(np.median(_short_waves(h, more)["psd"].values[octave])) <= _OF_GAPS * tail
+        floor = float(np.median(_complete(_spectrum(h, more), h)["psd"].values[octave])) <= _OF_GAPS * tail
     if not floor:
         least = math.sqrt(float(np.median(density[q > 0.8 * q[-1]])) / area)
         seen = f"no noise floor down to two cells; noise is below {_length(least)} rms"
         return Finding(seen, "", {}, {"rms": least, "floor": False})
     noise, cutoff = math.sqrt(tail / area), float(2 * np.pi / q[below[0] - 1])
-    slopes = density * waves["modes"].values * q**2
-    noisy = float(slopes[q > 2 * np.pi / cutoff].sum() / slopes.sum())
+    every = spectrum["wavevector"].values
+    slopes = spectrum["psd"].values * spectrum["modes"].values * every**2
+    noisy = float(slopes[every > 2 * np.pi / cutoff].sum() / slopes.sum())
     seen = f"{_length(noise)} rms: waves below {_length(cutoff)} are noise, {_percent(noisy)} of the mean square slope"
     is_harmful = noisy > _HARMLESS and cutoff >= 3 * cell
     step = {"filter": max(float(f"{cutoff:.2g}"), _rounded_up(3 * cell))} if is_harmful else {}
@@ -259,9 +261,14 @@ def _noise(h: xr.DataArray) -> Finding:
     return Finding(seen, "filter out these wavelengths" * is_harmful, step, values)
 
 
-def _short_waves(h: xr.DataArray, gaps: np.ndarray) -> xr.Dataset:
-    """Return the complete rings of the power spectrum; a membrane fills the gaps."""
-    return psd(fill(h.where(~gaps)), "hann").sel(wavevector=slice(None, np.pi / max(spacing(h))))
+def _spectrum(h: xr.DataArray, gaps: np.ndarray) -> xr.Dataset:
+    """Return the rings of the power spectrum down to two of the shorter cells; a membrane fills the gaps."""
+    return psd(fill(h.where(~gaps)), "hann").sel(wavevector=slice(None, np.pi / min(spacing(h))))
+
+
+def _complete(spectrum: xr.Dataset, h: xr.DataArray) -> xr.Dataset:
+    """Return the complete rings of the power spectrum, down to two of the longer cells."""
+    return spectrum.sel(wavevector=slice(None, np.pi / max(spacing(h))))
 
 
 def _rounded_up(value: float) -> float:

@@ -55,19 +55,29 @@ def test_boundary__is_mirror_where_opposite_borders_differ():
     assert found.area == pytest.approx(50e-6 * 41e-6)
 
 
-@pytest.mark.parametrize("shape", [(96, 80), (97, 61)])
-def test_noise__of_known_strength_is_found(shape):
-    smooth = rv.self_affine(
-        (shape[0] * 1e-6, shape[1] * 1e-6), shape, hurst=0.8, rms_height=1e-7, rolloff=4e-5, shortcut=1.2e-5, seed=3
-    )
-    noise = np.random.default_rng(5).normal(0, 2e-9, shape)
-    found = inspect(with_values(smooth.values + noise))
+@pytest.mark.parametrize(
+    ("shape", "cells"),
+    [((96, 80), (1e-6, 1e-6)), ((97, 61), (1e-3, 1e-3)), ((320, 80), (1e-6, 4e-6)), ((80, 321), (4e-9, 1e-9))],
+)
+def test_noise__of_known_strength_is_found(shape, cells):
+    longest, unit = max(cells), min(cells)
+    size = [n * side for n, side in zip(shape, cells, strict=True)]
+    shortest = 12 * longest
+    waves = {"hurst": 0.8, "rms_height": 0.1 * unit, "rolloff": 40 * longest, "shortcut": shortest, "seed": 3}
+    smooth = rv.self_affine(size, shape, **waves)
+    noisy = smooth.values + np.random.default_rng(5).normal(0, 2e-3 * unit, shape)
+    found = inspect(from_array(noisy, cells))
     noise = found.findings["Noise"].values
     assert noise["floor"]
-    assert noise["rms"] == pytest.approx(2e-9, rel=0.1)
-    assert noise["wavelength"] == pytest.approx(1.2e-5, rel=0.25)  # the surface has no shorter waves
+    assert noise["rms"] == pytest.approx(2e-3 * unit, rel=0.1)
+    assert noise["wavelength"] == pytest.approx(shortest, rel=0.25)  # the surface has no shorter waves
     assert found.steps["filter"] == pytest.approx(noise["wavelength"], rel=0.05)
-    assert found.rms_slope == pytest.approx(float(rv.parameters(smooth).Sdq), rel=0.2)  # and a little of the surface
+    slope = float(rv.parameters(smooth).Sdq)
+    assert found.rms_slope == pytest.approx(slope, rel=0.2)  # and a little of the surface
+    q = 2 * np.pi * np.hypot(np.fft.fftfreq(shape[0], cells[0])[:, None], np.fft.fftfreq(shape[1], cells[1]))
+    noisy_slopes = (2e-3 * unit * q[(q > 2 * np.pi / shortest) & (q < np.pi / unit)]) ** 2
+    share = noisy_slopes.sum() / q.size
+    assert noise["noisy_slopes"] == pytest.approx(share / (share + slope**2), rel=0.4)  # under a window
 
 
 def test_noise__is_not_seen_where_the_spectrum_falls_all_the_way():
