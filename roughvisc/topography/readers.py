@@ -37,6 +37,8 @@ FARTHEST = 1e3
 #: the file, it occurs at least this many times, and its distance from the next height exceeds this multiple of the
 #: range of all other heights. Exactly flat pits of a manufactured texture have smaller numbers.
 _NO_DATA, _REPEATED, _FAR = 999.0, 4, 10.0
+#: Usual marks of missing points, by size, for which one range is far enough: heights of 1 um are thousands of nm.
+_MARKS = (9999.0, 99999.0, 999999.0, 32767.0, 32768.0)
 _READER = threading.RLock()
 #: Largest distance of a point from its lattice, in steps, and deviation of the axes of the lattice from x and y [rad].
 _OFF = 0.01
@@ -154,7 +156,7 @@ def _without_no_data(values: np.ndarray, no_data: float | None, complaints: list
     rest = values[np.isfinite(values) & ~np.isin(values, extremes)]
     spread = float(np.ptp(rest)) if rest.size >= _FEWEST else 0.0
     for one in extremes if spread > 0 else ():
-        if np.abs(rest - one).min() > _FAR * spread:
+        if np.abs(rest - one).min() > (1.0 if abs(one) in _MARKS else _FAR) * spread:
             here = values == one
             values = np.where(here, np.nan, values)
             others = f"all others lie within {rest.min():g} to {rest.max():g}"

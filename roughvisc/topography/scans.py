@@ -82,8 +82,8 @@ def open_scan(
         missing without a point. Default: the lattice on which the points lie, to a hundredth of its steps. [m]
     no_data : float, optional
         Number that marks a missing point, in the unit of the file. Default: the lowest or highest number, if it is at
-        least 999 in size, occurs at four points or more, and is further from all others than ten times their range; a
-        warning reports it.
+        least 999 in size, occurs at four points or more, and is further from all others than ten times their range, or
+        than their range if it is a usual mark such as -9999; a warning reports it.
     height_scale : float, optional
         Factor of the heights, for a file that states a wrong unit: 1e-6 if micrometres are labelled as metres. [-]
 

@@ -215,6 +215,34 @@ def test_height_scale__opens_a_file_that_states_a_wrong_unit():
         open_scan(path, spacing="0.645 um", height_scale=0)
 
 
+@pytest.mark.parametrize(("unit", "size"), [("m", 1.0), ("mm", 1e-3), ("um", 1e-6), ("nm", 1e-9)])
+def test_text__has_the_same_heights_in_any_unit(unit, size, tmp_path):
+    """A matrix with its coordinates, a matrix with a number for missing points, and points also on borders of cells."""
+    x, y, z = 5e-7 * np.arange(24), 2.5e-7 * np.arange(20) + 1e-3, 1e-6 * ROUGH
+    path = matrix(tmp_path / "m.csv", pd.DataFrame(z / size, y / size, x / size))
+    with pytest.warns(UserWarning, match="taken as coordinates"):
+        h = open_scan(path, unit=unit)
+    np.testing.assert_allclose(h, z.T, rtol=1e-12)
+    np.testing.assert_allclose(spacing(h), (5e-7, 2.5e-7), rtol=1e-9)
+    holed = z / size
+    holed[3:5, 4:9] = -9999
+    np.savetxt(path, holed, delimiter=",")
+    with pytest.warns(UserWarning, match="10 points have the height -9999"):
+        h = open_scan(path, unit=unit, spacing="1 um")
+    np.testing.assert_allclose(h, np.where(holed == -9999, np.nan, z).T, rtol=1e-12)
+    on_lattice = points()
+    np.savetxt(tmp_path / "p.xyz", on_lattice * 1e-6 / size)
+    i, j = (on_lattice[:, :2] / (2, 3)).round().astype(int).T
+    nodes = np.empty((40, 30))
+    nodes[i, j] = 1e-6 * on_lattice[:, 2]
+    h = open_scan(tmp_path / "p.xyz", unit=unit)
+    np.testing.assert_allclose(h, nodes, rtol=1e-12)
+    np.testing.assert_allclose(spacing(h), (2e-6, 3e-6), rtol=1e-9)
+    i, j = np.minimum(np.arange(40) // 3, 12), np.arange(30) // 2  # the last x is the upper border of its cell
+    means = [[nodes[np.ix_(i == row, j == column)].mean() for column in range(15)] for row in range(13)]
+    np.testing.assert_allclose(open_scan(tmp_path / "p.xyz", unit=unit, grid="6 um"), means, rtol=1e-12)
+
+
 # -- points and tables -------------------------------------------------------------------------------------------------
 
 
