@@ -105,3 +105,61 @@ def test_door__gives_the_same_in_any_unit(door):
             size = float(abs(expected[name]).max())
             np.testing.assert_allclose(variable, expected[name].variable, rtol=1e-9, atol=1e-9 * size, err_msg=name)
             assert variable.attrs.get("units") == expected[name].attrs.get("units"), name
+
+
+def turned(h):
+    """The map read with x and y exchanged."""
+    return h.rename(x="y", y="x").transpose("x", "y")
+
+
+#: Function of heights, and the function that does the same on the transpose.
+BOTH_WAYS = {
+    "level": lambda h: rv.level(h, 2 if min(h.shape) > 2 else 1),
+    "mask_outliers": rv.mask_outliers,
+    "fill": rv.fill,
+    "gaussian_filter": lambda h: rv.gaussian_filter(h, 3.2 * max(spacing(h))),
+    "resample": (lambda h: rv.resample(h, (6, 3)), lambda h: rv.resample(h, (3, 6))),
+    "resample, periodic": (
+        lambda h: rv.resample(rv.fill(h), (5, 30), periodic=True),
+        lambda h: rv.resample(rv.fill(h), (30, 5), periodic=True),
+    ),
+    "without_short_waves": lambda h: rv.without_short_waves(rv.fill(h), 9e-6),
+    "crop": (lambda h: rv.crop(h, x=(0, 17e-6)), lambda h: rv.crop(h, y=(0, 17e-6))),
+    "rotate90": (rv.rotate90, lambda h: rv.rotate90(h, -1)),
+    "combine": (
+        lambda h: rv.combine(h, 2 * h, "x", offset=(1e-6, 0.0)),
+        lambda h: rv.combine(h, 2 * h, "y", offset=(0.0, 1e-6)),
+    ),
+    "mirror": rv.mirror,
+    "parameters": rv.parameters,
+    "psd": lambda h: rv.psd(rv.fill(h), "hann"),
+}
+
+
+@pytest.mark.parametrize(
+    ("shape", "cells"),
+    [((24, 9), (1e-6, 4e-6)), ((17, 20), (4e-6, 1e-6)), ((40, 2), (1e-6, 4e-6)), ((2, 40), (9e-6, 1e-6))],
+)
+def test_door__gives_the_transpose_of_the_transpose(shape, cells):
+    h = rv.from_array(1e-7 * np.random.default_rng(0).normal(size=shape).cumsum(0).cumsum(1), cells)
+    h[shape[0] // 3, shape[1] // 2] = np.nan
+    for door, ways in BOTH_WAYS.items():
+        if min(shape) == 2 and door in ("without_short_waves", "combine"):  # too narrow
+            continue
+        direct, exchanged = ways if isinstance(ways, tuple) else (ways, ways)
+        found, expected = exchanged(turned(h)), direct(h)
+        if isinstance(found, xr.DataArray):
+            found = turned(found)
+            np.testing.assert_allclose(found.values, expected.values, rtol=0, atol=1e-15, err_msg=door)
+            np.testing.assert_allclose(spacing(found), spacing(expected), rtol=1e-12, err_msg=door)
+        else:
+            for name, values in expected.items():
+                np.testing.assert_allclose(found[name], values, rtol=1e-9, atol=1e-30, err_msg=f"{door}: {name}")
+    found, expected = rv.inspect(turned(h)), rv.inspect(h)
+    assert (found.steps, found.boundary) == (expected.steps, expected.boundary)
+    assert found.rms_slope == pytest.approx(expected.rms_slope, rel=1e-9)
+    assert found.area == pytest.approx(expected.area, rel=1e-12)
+    for name in ("slopes", "of_neighbours"):
+        finding = "Borders" if name == "of_neighbours" else "Tilt and form"
+        one, other = (each.findings[finding].values[name] for each in (found, expected))
+        np.testing.assert_allclose(one, other[::-1], rtol=1e-9, err_msg=name)

@@ -1,8 +1,11 @@
 """Reading of scans: heights and positions from instrument files, grid files and surface cards."""
 
 import hashlib
+import json
 import random
 import zipfile
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -52,6 +55,65 @@ def test_real_scan__libraries_agree_on_orientation_and_scale(name):
     theirs = io.read_topography(str(SCANS / name), format=h.attrs["format"]).to_unit("m")
     np.testing.assert_allclose(h, np.ma.filled(theirs.heights(), np.nan), rtol=1e-12, atol=1e-20)
     np.testing.assert_allclose(spacing(h), np.array(theirs.physical_sizes) / h.shape, rtol=1e-9)
+
+
+@real
+@pytest.mark.parametrize("suffix", ["001", "005", "017", "999", "SPM"])
+def test_real_scan__is_recognised_by_the_number_that_an_instrument_counts(suffix, tmp_path):
+    (tmp_path / f"scan.{suffix}").write_bytes((SCANS / "di-3.di").read_bytes())
+    h = open_scan(tmp_path / f"scan.{suffix}")
+    assert h.attrs["format"] == "di"
+    np.testing.assert_array_equal(h, open_scan(SCANS / "di-3.di"))
+
+
+class Stub:
+    """Reader of SurfaceTopography with one channel, whose heights differ along x and y."""
+
+    def __init__(self, path):
+        self.channels = [SimpleNamespace(**CHANNEL | json.loads(Path(path).read_text()))]
+        self.close = lambda: None
+
+
+CHANNEL = {
+    "channel_id": "z",
+    "nb_grid_pts": (13, 9),
+    "physical_sizes": (26.0, 27.0),
+    "unit": "um",
+    "data_unit": None,
+    "is_height_channel": True,
+    "dim": 2,
+    "is_uniform": True,
+    "info": {},
+    "topography": lambda **_: SimpleNamespace(heights=lambda: 1e6 * tilted()),
+}
+
+
+@pytest.mark.parametrize(
+    ("change", "is_read"),
+    [
+        ({}, True),
+        ({"is_uniform": None}, True),
+        ({"unit": None, "data_unit": "um"}, False),
+        ({"is_height_channel": False}, False),
+        ({"dim": 1}, False),
+        ({"unit": "V"}, False),
+        ({"data_unit": "V"}, False),
+        ({"unit": ["um", None]}, False),
+        ({"is_uniform": False}, False),
+    ],
+    ids=str,
+)
+def test_channel__of_a_library_is_a_height_only_if_all_conditions_hold(change, is_read, tmp_path, monkeypatch):
+    library = pytest.importorskip("SurfaceTopography.IO")
+    monkeypatch.setitem(library.lookup_reader_by_format, "stub", Stub)
+    path = tmp_path / "scan.stub"
+    path.write_text(json.dumps(change))
+    if not is_read:
+        refusal(path, format="stub")
+        return
+    h = open_scan(path, format="stub")
+    np.testing.assert_allclose(h, tilted(), rtol=1e-12)
+    np.testing.assert_allclose(spacing(h), CELL, rtol=1e-12)
 
 
 # -- round trips and orientation ---------------------------------------------------------------------------------------
