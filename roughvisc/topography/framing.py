@@ -204,9 +204,10 @@ def _on_common_cells(h1: xr.DataArray, h2: xr.DataArray, apart: tuple[float, flo
         lower = ((np.arange(n1) - n1 / 2) * d1 - by) / d2 + n2 / 2  # borders of the first, in cells of the second
         covered = (lower >= -_ON_BORDER) & (lower + side <= n2 + _ON_BORDER)
         if covered.sum() < 2:
+            *lengths, apart_by = (format_quantity(length, "m") for length in (n1 * d1, n2 * d2, by))
             raise InputError(
                 f"combine: the second face covers {covered.sum()} of {n1} cells of the first along {axis}: they are "
-                f"{n1 * d1:.6g} and {n2 * d2:.6g} m long, the centres {by:g} m apart: expected at least two cells"
+                f"{' and '.join(lengths)} long, the centres {apart_by} apart: expected at least two cells"
             )
         kept[axis] = covered
         at.append(np.clip(lower[covered] + side / 2 - 0.5, 0, n2 - 1))  # new centres, in numbers of old cells

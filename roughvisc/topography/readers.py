@@ -100,7 +100,8 @@ def _labelled(file: ScanFile, channel: Channel, given: Mapping[str, Any]) -> xr.
     h = checked(h, "an areal scan")
     for axis, d, n in zip(("x", "y"), cell_sides(h), h.shape, strict=True):
         if n * d > WIDEST or d < FINEST:
-            found = f"it is {n * d:.6g} m wide along {axis} at a spacing of {d:.6g} m, which is not plausible"
+            width, side = format_quantity(n * d, "m"), format_quantity(d, "m")
+            found = f"it is {width} wide along {axis} at a spacing of {side}, which is not plausible"
             expected = "another unit or spacing, and height_scale if its heights are in another unit too"
             raise InputError(f"{found} (at most {WIDEST:g} m, at least {FINEST:g} m): expected {expected}")
     finite(h, HIGHEST)

@@ -24,7 +24,7 @@ from roughvisc.topography.borders import is_mirrored, is_periodic, period_of
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.grid import checked, counts, labelled, noted, pair, spacing, with_coordinates
 from roughvisc.topography.spectrum import psd, ring_numbers, wavevectors
-from roughvisc.units import Quantity, number, quantities
+from roughvisc.units import Quantity, format_quantity, number, quantities
 
 #: Largest number of cells of an indenter on a larger grid.
 _MOST_GROWN = 4096**2
@@ -143,7 +143,8 @@ def wavy(amplitude: Quantity, wavelength: Quantity, size: Any, shape: Any, waves
     for side in size[:waves]:
         periods = side / wavelength
         if round(periods) < 1 or abs(periods - round(periods)) > 1e-9 * periods:
-            expected = f"a whole number of wavelengths, so that the waves repeat; {side:.6g} m holds {periods:.6g}"
+            held = f"{format_quantity(side, 'm')} holds {periods:.6g}"
+            expected = f"a whole number of wavelengths, so that the waves repeat; {held}"
             raise InputError(key="size", found=size, expected=expected)
     shape = cells(shape)
     repeats = (round(size[0] / wavelength), round(size[1] / wavelength) * (waves == 2))
@@ -251,7 +252,9 @@ def self_affine(
     power = power if rms_slope is None else power * (q_x[:, None] ** 2 + q_y**2)
     square = float(sum(power[start : start + 64].sum() for start in range(0, shape[0], 64)))
     if not square:
-        raise InputError(f"no wave of the domain is longer than shortcut = {shortcut:.6g} [m]: expected a larger size")
+        raise InputError(
+            f"no wave of the domain is longer than shortcut = {format_quantity(shortcut, 'm')}: expected a larger size"
+        )
     heights = random_heights(amplitude, shape[1], entropy, normal=amplitudes == "gaussian")
     heights *= (rms_slope or rms_height) / math.sqrt(square)
     parameters = {"hurst": hurst, "rms_slope": rms_slope, "rms_height": rms_height, "rolloff": rolloff}
