@@ -111,6 +111,18 @@ def test_mask_outliers__finds_spikes_and_nothing_else():
     assert mask_outliers(h).attrs["outliers"] == 0
 
 
+@pytest.mark.parametrize("threshold", [8.0, 5.0])
+def test_mask_outliers__threshold_counts_standard_deviations_of_normal_noise(threshold):
+    """In a window that is as noisy as the scan or noisier; in a quiet part the deviation of the whole scan counts."""
+    noise = np.random.default_rng(2).normal(0, 1e-8, (72, 63))
+    noise[:, 54:] *= 0.1
+    for deviations, is_outlier in ((0.8 * threshold, False), (1.5 * threshold, True)):
+        spiked = noise.copy()
+        spiked[4::9, 4::9] = deviations * 1e-8
+        found = np.isnan(mask_outliers(from_array(spiked, CELL), threshold=threshold).values[4::9, 4::9])
+        np.testing.assert_array_equal(found, is_outlier)
+
+
 @pytest.mark.parametrize("turned", [False, True])
 def test_mask_outliers__finds_isolated_points_in_holes_at_any_height(turned):
     """Stray points of a confocal instrument: some have the height of the surface. The rim of the hole is no outlier."""
@@ -118,13 +130,16 @@ def test_mask_outliers__finds_isolated_points_in_holes_at_any_height(turned):
     h = h.transpose("y", "x").rename(x="y", y="x") if turned else h
     i, j = np.indices(h.shape)
     hole = np.hypot(i - 20, j - 22) < 15
-    stray = hole & (i % 6 == 0) & (j % 5 == 0) & (np.hypot(i - 20, j - 22) < 12)
-    assert stray.sum() > 10
+    stray = hole & (i % 6 <= 1) & (j % 5 == 0) & (np.hypot(i - 20, j - 22) < 12)  # alone, and in pairs
+    assert stray.sum() > 20
+    island = (abs(i - 45) < 3) & (abs(j - 40) < 3)  # of 25 points: a pillar in another hole
+    hole |= (abs(i - 45) < 10) & (abs(j - 40) < 10) & ~island
     holed = h.where(~hole | stray)
     for values in (holed, holed + 1e-4 * stray, holed - 1e-4 * stray):
         done = mask_outliers(values)
         np.testing.assert_array_equal(np.isnan(done.values), hole)
         assert done.attrs["outliers"] == stray.sum()
+    assert mask_outliers(mask_outliers(holed)).attrs["outliers"] == stray.sum(), "none is counted twice or lost"
     sparse = h.where((i % 3 == 0) & (j % 3 == 0))  # a coarse scan on a fine lattice: all of its points are far apart
     assert mask_outliers(sparse).attrs["outliers"] == 0
 
@@ -270,3 +285,7 @@ def test_filled__goes_with_its_points_through_later_steps():
     ):  # other cells: their number is known
         assert "filled" not in step.coords
         assert step.attrs["filled_points"] == int(done["filled"].sum())
+        assert step.attrs["filled_fraction"] == float(done["filled"].mean())
+    whole = rough((20, 16))
+    assert combine(whole, done).attrs["filled_fraction"] == float(done["filled"].mean())
+    assert "filled_fraction" not in combine(whole, whole).attrs

@@ -44,6 +44,8 @@ def test_tilt__and_form_by_their_coefficients():
     assert curved.steps["level"] == 2
     form = curved.findings["Tilt and form"].values
     assert form["share"] > 0.9
+    rms = [float(rv.level(with_values(SMOOTH.values + ball), order).std()) for order in (1, 2)]
+    assert form["share"] == pytest.approx(1 - (rms[1] / rms[0]) ** 2, rel=1e-9)
     assert form["rms_without"] == pytest.approx(float(rv.level(SMOOTH, 2).std()), rel=1e-9)
 
 
@@ -104,6 +106,7 @@ def test_missing_points__are_filled_and_large_holes_cropped_away(transposed, cel
         values[place] += 5e-6
     values, cells = (values.T, cells[::-1]) if transposed else (values, cells)
     scan = from_array(values, cells)
+    scan = scan.assign_coords(x=scan.x + 3e-3, y=scan.y - 7e-3)  # a part of a larger map
     found = inspect(scan)
     missing = found.findings["Missing points"]
     assert missing.values["points"] == int(np.isnan(values).sum())
@@ -121,10 +124,13 @@ def test_missing_points__without_a_part_free_of_holes_are_filled():
     values = SMOOTH.values.copy()
     i, j = np.indices(values.shape)
     values[(np.abs(i % 24 - 12) < 7) & (np.abs(j % 24 - 12) < 7)] = np.nan
-    found = inspect(with_values(values))
-    assert found.steps["fill"] is True
-    assert "crop" not in found.steps
-    assert "crop" not in found.findings["Missing points"].advice
+    wide = np.tile(values, (3, 3))
+    wide[:18, :18] = SMOOTH.values[:18, :18]  # a part without holes, less than a tenth of the scan
+    for holed in (values, wide):
+        found = inspect(with_values(holed))
+        assert found.steps["fill"] is True
+        assert "crop" not in found.steps
+        assert "crop" not in found.findings["Missing points"].advice
     values = SMOOTH.values.copy()
     values[10, 10] = values[30, 40] = np.nan
     few = inspect(with_values(values)).findings["Missing points"]

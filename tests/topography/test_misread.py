@@ -145,9 +145,10 @@ def test_index__of_lengths_is_the_spacing(corner, tmp_path):
         h = open_scan(path, unit="um")
     np.testing.assert_allclose(h, 1e-6 * ROUGH.T, rtol=1e-12)
     np.testing.assert_allclose(spacing(h), (0.5e-6, 0.25e-6), rtol=1e-12)
-    matrix(path, pd.DataFrame(ROUGH[::-1], y[::-1], x), index_label=corner)  # the largest y first
-    with pytest.warns(UserWarning, match="taken as coordinates"):
-        np.testing.assert_array_equal(open_scan(path, unit="um"), h)
+    for i, j in ((-1, 1), (1, -1), (-1, -1)):  # the largest y or x first
+        matrix(path, pd.DataFrame(ROUGH[::i, ::j], y[::i], x[::j]), index_label=corner)
+        with pytest.warns(UserWarning, match="taken as coordinates"):
+            np.testing.assert_array_equal(open_scan(path, unit="um"), h)
     centres = pd.DataFrame(ROUGH, np.arange(20) + 0.5, np.arange(24) + 0.5)
     matrix(path, centres, index_label=corner)  # in steps of one, and no index
     with pytest.warns(UserWarning, match="taken as coordinates"):

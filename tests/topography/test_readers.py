@@ -121,9 +121,9 @@ def test_channel__of_a_library_is_a_height_only_if_all_conditions_hold(change, i
 
 def test_netcdf__units_are_converted_and_descending_axes_turned(tmp_path):
     h = from_array(tilted(), CELL)
-    micro = (h * 1e9).assign_coords(x=h.x * 1e6, y=h.y * 1e6)[::-1].assign_attrs(units="nm")
-    micro.x.attrs["units"] = micro.y.attrs["units"] = "um"
-    for name in ("scan.nc", "scan.h5"):
+    for name, step in (("scan.nc", (-1, 1)), ("scan.h5", (1, -1)), ("both.nc", (-1, -1))):
+        micro = (h * 1e9).assign_coords(x=h.x * 1e6, y=h.y * 1e6)[:: step[0], :: step[1]].assign_attrs(units="nm")
+        micro.x.attrs["units"] = micro.y.attrs["units"] = "um"
         micro.to_netcdf(tmp_path / name, engine="netcdf4")
         xr.testing.assert_allclose(open_scan(tmp_path / name), h, atol=1e-20)
 
