@@ -45,7 +45,7 @@ def _reading(command: Any) -> Any:
 _MAKER = "roughvisc scan"
 #: Question for an argument that a file lacks, and the type of the answer.
 _QUESTIONS: dict[str, tuple[str, Any]] = {
-    "unit": ("Unit of x, y and heights (such as um)", str),
+    "unit": ("Unit of x, y and heights (such as um, or mm,um)", str),
     "spacing": ("Distance between points (such as 1 um)", _sides),
 }
 

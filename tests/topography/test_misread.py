@@ -105,6 +105,11 @@ def test_truemap__may_have_any_comment(comment, tmp_path):
     assert h.shape == (12, 8)
     np.testing.assert_allclose(spacing(h), 1e-5, rtol=1e-6)
     np.testing.assert_allclose(h[0, -1], 1e-3 * struct.unpack("<f", content[57:61])[0], rtol=1e-9)  # top left
+    sides = at + len(comment) + 1 + 8  # width and height in mm follow the counts of columns and rows
+    longer = bytearray((tmp_path / "a.tmd").read_bytes())
+    longer[sides : sides + 8] = struct.pack("<2f", 0.12, 0.16)
+    (tmp_path / "a.tmd").write_bytes(longer)
+    np.testing.assert_allclose(spacing(open_scan(tmp_path / "a.tmd")), (1e-5, 2e-5), rtol=1e-6)
 
 
 @real

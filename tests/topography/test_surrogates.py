@@ -24,6 +24,16 @@ def test_surrogates__have_the_radial_spectrum_of_the_surface_on_average():
     assert bool((abs(found / wanted.psd - 1) < 4 * scatter)[rings].all())
 
 
+@pytest.mark.parametrize("sides", [(1e-6, 3e-6), (3e-6, 1e-6)])
+def test_surrogates__of_unequal_cells_have_the_waves_of_complete_rings_only(sides):
+    h = rv.from_array(np.random.default_rng(0).normal(0, 1e-7, (40, 33)), sides)
+    found = rv.surrogates(h, 1, seed=1)[0]
+    q = 2 * np.pi * np.hypot(np.fft.fftfreq(40, sides[0])[:, None], np.fft.fftfreq(33, sides[1]))
+    waves = np.abs(np.fft.fft2(found.values))
+    assert waves[q > np.pi / 3e-6].max() < 1e-12 * waves.max()
+    assert waves[(q > 0) & (q < 0.99 * np.pi / 3e-6)].min() > 0
+
+
 def test_surrogates__are_one_surface_on_any_grid():
     h = rough((45, 52))
     coarse = rv.resample(h, (31, 36))  # holds all of its waves
