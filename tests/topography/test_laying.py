@@ -62,6 +62,12 @@ def test_combine__points_missing_in_the_second_are_missing_in_the_sum():
     second[0, 1] = np.nan  # three quarters
     both = rv.combine(first, second, "x")
     assert np.argwhere(np.isnan(both.values)).tolist() == [[3, 0]]
+    for axis in (0, 1):  # a missing cell of equal size covers 0.7 of one cell and 0.3 of the next
+        second = rv.from_array(np.where(np.arange(30).reshape(5, 6) == 15, np.nan, 0.0), spacing=2e-6)
+        offset = [0.6e-6 * (axis == other) for other in (0, 1)]
+        both = rv.combine(rv.from_array(np.zeros((5, 6)), spacing=2e-6), second, offset=offset)
+        ((i, j),) = np.argwhere(np.isnan(both.values))
+        assert (float(both.x[i]), float(both.y[j])) == pytest.approx((5e-6, 7e-6))
 
 
 def test_combine__two_balls_press_as_one_of_the_harmonic_radius():
