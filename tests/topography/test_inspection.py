@@ -29,6 +29,12 @@ def test_spikes__are_counted_and_what_they_do_to_sq():
     plane = rv.level(SMOOTH)
     assert spikes["rms_without"] == pytest.approx(float(plane.std()), rel=1e-3)
     assert inspect(SMOOTH).findings["Spikes"].values["points"] == 0
+    for count, is_few in ((140, True), (240, False)):  # of 7,680 points; more than 2 % may be the surface itself
+        values = SMOOTH.values.copy()
+        values.flat[7 : 31 * count + 7 : 31] += 5e-6
+        found = inspect(with_values(values))
+        assert found.findings["Spikes"].values["points"] == count
+        assert ("outliers" in found.steps) == is_few
 
 
 def test_tilt__and_form_by_their_coefficients():
@@ -39,6 +45,10 @@ def test_tilt__and_form_by_their_coefficients():
     np.testing.assert_allclose(slopes, (0.02 + x_tilt, -0.03 + y_tilt), rtol=1e-9)
     assert tilted.steps["level"] == 1
     assert "level" not in inspect(rv.level(SMOOTH)).steps
+    flat, plane = rv.level(SMOOTH).values, x - x.mean()
+    for share, is_tilted in ((0.005, False), (0.05, True)):  # of the rms height
+        steps = inspect(with_values(flat + share * flat.std() / plane.std() * plane)).steps
+        assert ("level" in steps) == is_tilted
     ball = (x - x.mean()) ** 2 / (2 * 1e-3)
     curved = inspect(with_values(SMOOTH.values + ball))
     assert curved.steps["level"] == 2

@@ -3,6 +3,7 @@
 The heights of the small files in `misread/` are those of :func:`waves`, rounded, unless a test says otherwise.
 """
 
+import re
 import struct
 import warnings
 import zlib
@@ -49,6 +50,13 @@ def test_file_of_a_maker__has_its_heights_in_their_places(name):
     if options:
         with refused("unit"):
             open_scan(FILES / name)
+
+
+def test_esri__may_state_both_sides_of_its_cells(tmp_path):
+    text, count = re.subn(r"(?im)^cellsize.*$", "dx 0.5\ndy 0.25", (FILES / "esri.asc").read_text())
+    assert count == 1
+    (tmp_path / "unequal.asc").write_text(text)
+    np.testing.assert_allclose(spacing(open_scan(tmp_path / "unequal.asc", unit="mm")), (0.5e-3, 0.25e-3), rtol=1e-12)
 
 
 def test_wyko__heights_in_waves(tmp_path):
@@ -196,6 +204,18 @@ def test_no_data__is_missing_with_a_warning(number, kind, tmp_path):
             np.testing.assert_array_equal(open_scan(path, **options, no_data=number), h)
 
 
+@pytest.mark.parametrize(("ranges", "missing"), [(15, 10), (6, 0)])
+def test_no_data__is_further_from_all_others_than_ten_times_their_range(ranges, missing, tmp_path):
+    z = ROUGH * (1500 / ranges / np.ptp(ROUGH))
+    z[3:5, 4:9] = -1500
+    np.save(tmp_path / "m.npy", z)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        h = open_scan(tmp_path / "m.npy", unit="um", spacing="1 um")
+    assert int(np.isnan(h).sum()) == missing
+    assert bool(said) == bool(missing)
+
+
 def test_no_data__is_not_seen_in_the_flat_pits_of_a_texture(tmp_path):
     h = rv.from_array(np.where(ROUGH > 1, -5e-6, 1e-8 * ROUGH), 1e-6)
     for suffix in ("nc", "x3p"):
@@ -289,6 +309,12 @@ def test_points__off_any_lattice_ask_for_a_grid_and_count_empty_cells(tmp_path):
         fine = open_scan(tmp_path / "p.csv", unit="um", grid="0.5 um")  # at most one point in a cell
     known = np.sort(fine.values[np.isfinite(fine.values)])
     np.testing.assert_allclose(known, 1e-6 * np.sort(points(jitter=0.3)[:, 2]), rtol=1e-12)
+
+
+def test_points__of_which_two_have_one_place_ask_for_a_grid(tmp_path):
+    np.savetxt(tmp_path / "p.xyz", np.vstack([points(), points()[0] + np.array([0, 0, 0.5])]))
+    with refused("grid"):
+        open_scan(tmp_path / "p.xyz", unit="um")
 
 
 @pytest.mark.parametrize("options", [{}, {"grid": "6 um"}])

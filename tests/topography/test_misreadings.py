@@ -119,6 +119,9 @@ def test_header__that_states_the_unit_of_x_and_y_alone(tmp_path):
     np.testing.assert_allclose(h, 1e-9 * tilted(missing=False), rtol=1e-9)
     path.write_text(path.read_text().replace(".", ",").replace("26 ", "26,0 "))
     np.testing.assert_array_equal(open_scan(path, unit="nm"), h)
+    path = write_text(tmp_path / "scan.txt", header="# Width: 0.026 mm\n# Height: 27.0 µm\n")
+    np.testing.assert_array_equal(open_scan(path, unit="nm"), h)
+    np.testing.assert_allclose(spacing(open_scan(path, unit="nm")), CELL, rtol=1e-12)
     path.write_text("# Width: 2,5 µm\n# Height: 7,5 µm\n" + "1 2 3 4 5\n" * 5)  # the header alone has decimals
     np.testing.assert_allclose(spacing(open_scan(path, unit="nm")), (5e-7, 1.5e-6), rtol=1e-12)
 
@@ -161,9 +164,9 @@ def test_axes__on_no_regular_grid_are_refused(tmp_path):
     assert "absolute axes" in refusal(tmp_path / "bad.x3p")
 
 
-@pytest.mark.parametrize("width", [2.0, 1e3])
+@pytest.mark.parametrize("width", [2.0, 1e-10])
 @pytest.mark.parametrize("kind", ["x3p", "sdf", "nc"])
-def test_too_wide__is_refused_and_spacing_mends_it(kind, width, tmp_path):
+def test_too_wide_or_fine__is_refused_and_spacing_mends_it(kind, width, tmp_path):
     path, cell = tmp_path / f"scan.{kind}", width / 13
     if kind == "nc":
         from_array(tilted(), (cell, 1e-6)).to_netcdf(path)
