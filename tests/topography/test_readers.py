@@ -3,6 +3,7 @@
 import hashlib
 import json
 import random
+import re
 import zipfile
 from pathlib import Path
 from types import SimpleNamespace
@@ -242,6 +243,18 @@ BALL = 'generate = "sphere"\nradius = 1\nsize = 1e-6\nshape = 4\n'
 )
 def test_card__refuses_and_names_card_and_key(text, named, tmp_path):
     assert named in refusal(card(tmp_path, text))
+
+
+def test_card__checksum_counts_in_any_case_and_must_be_that_of_the_file(tmp_path):
+    path = file_card(tmp_path)
+    expected, text = open_scan(path), path.read_text()
+    (sha,) = re.findall('sha256 = "(.*)"', text)
+    path.write_text(text.replace(sha, sha.upper()))
+    np.testing.assert_array_equal(open_scan(path), expected)
+    wrong = sha[::-1]
+    path.write_text(text.replace(sha, wrong))
+    with refused("sha256", wrong):
+        open_scan(path)
 
 
 def test_card__every_step_acts(tmp_path):
