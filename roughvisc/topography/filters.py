@@ -114,8 +114,8 @@ def mask_outliers(h: xr.DataArray, window: int = 9, threshold: float = 8.0) -> x
     Notes
     -----
     Instruments fail at steep flanks and often have spikes next to missing points. Mask these before :func:`fill`, which
-    would otherwise use the spikes as the rim of the hole. Isolated points inside a large hole are outliers whatever
-    their height, see :func:`isolated`.
+    would otherwise use the spikes as the rim of the hole. Isolated points inside a large hole are outliers at any
+    height, see :func:`isolated`.
     """
     if not isinstance(window, int) or window < 3 or window % 2 == 0:
         raise InputError(key="window", found=window, expected="an odd whole number of at least 3")
@@ -137,8 +137,8 @@ def mask_outliers(h: xr.DataArray, window: int = 9, threshold: float = 8.0) -> x
 def isolated(present: np.ndarray, window: int = 9) -> np.ndarray:
     """Return the mask of isolated points: groups of at most `window` points where most points are missing.
 
-    The window about such a point holds more missing points than others. If more than a tenth of all points are of this
-    kind, the points were measured far apart, and none counts as isolated.
+    If more than a tenth of all points are isolated, the scan was measured at distant points, and none counts as
+    isolated.
 
     Parameters
     ----------

@@ -272,7 +272,7 @@ def _complete(spectrum: xr.Dataset, h: xr.DataArray) -> xr.Dataset:
 
 
 def _rounded_up(value: float) -> float:
-    """Return the next number of three digits that is not smaller, but for rounding."""
+    """Round a number up to three digits, without the effect of rounding errors."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 2)
     return float(f"{math.ceil(value / unit - 1e-9) * unit:.12g}")
 

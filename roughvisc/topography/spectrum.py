@@ -24,7 +24,7 @@ from roughvisc.units import Quantity, number, quantities
 _OF_SLOPE = 0.99
 #: Largest bandwidth of waves of nearly one length, of their heights and of their slopes, and fewest cells along a side.
 _OF_HEIGHTS, _OF_SLOPES, _FEWEST = 1.15, 1.1, 8
-#: Largest reduction of an overlap by rounding, relative to a cell; and the same of a wavevector, relative to a ring.
+#: Largest change by rounding of an overlap, relative to a cell, and of a wavevector, relative to the width of a ring.
 _ROUNDING, _ON_RING = 1e-9, 1e-9
 
 
@@ -68,7 +68,7 @@ def last_octave(z: np.ndarray, cells: tuple[float, float]) -> tuple[np.ndarray, 
 
 
 def is_narrow_band(h: xr.DataArray) -> bool:
-    r"""Return whether the slopes of a surface are those of waves of nearly one length, longer than four cells.
+    r"""Return whether the slopes of a surface belong to waves of nearly one length, longer than four cells.
 
     Nayak's bandwidth :math:`m_0 m_4 / m_2^2` is 1 for waves of one length, 4/3 for waves of equal power up to a limit,
     and 2 for such waves under a Gaussian filter. With :math:`m_2 m_6 / m_4^2` it is the bandwidth of the slopes, which
