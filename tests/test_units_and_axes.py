@@ -91,7 +91,8 @@ def assert_same(found, expected, frame, but=()):
     assert found.variables.keys() == expected.variables.keys()
     for name in set(expected.variables) - {"x", "y", "wall_time", "convolutions", *but}:
         wanted = expected[name].values
-        precision = 1e-3 * np.abs(wanted).max(initial=1e-300, where=np.isfinite(wanted))
+        part = 0.25 if name == "residual" else 1e-3  # by rounding the solver may stop one iteration earlier
+        precision = part * np.abs(wanted).max(initial=1e-300, where=np.isfinite(wanted))
         np.testing.assert_allclose(frame.result(found[name]), wanted, rtol=0, atol=precision, err_msg=name)
 
 

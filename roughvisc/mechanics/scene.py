@@ -26,15 +26,13 @@ class Corner:
 
     Attributes
     ----------
-    changes_control : bool
-        Whether the next segment prescribes another quantity.
     is_smooth : bool
-        Whether pairs of steps may keep their length: neither segment is a jump or a slide, and the control stays.
+        Whether pairs of steps may keep their length: neither segment is a jump or a slide, the control stays, and the
+        corner is not abrupt.
     is_abrupt : bool
         Whether the load of a contact jumps, because the body has no instantaneous compliance.
     """
 
-    changes_control: bool
     is_smooth: bool
     is_abrupt: bool
 
@@ -46,7 +44,7 @@ def corners_of(program: Program, can_jump: bool) -> list[Corner]:
         changes = following.control != last.control
         lasts = last.duration > 0 and last.slide is None and following.duration > 0 and following.slide is None
         abrupt = not can_jump and (changes or last.control == "approach")
-        corners.append(Corner(changes, lasts and not changes and not abrupt, abrupt))
+        corners.append(Corner(lasts and not changes and not abrupt, abrupt))
     return corners
 
 

@@ -1,7 +1,7 @@
 """Stated error of the time steps: the difference between two solutions, and what both share.
 
-The fine solution takes a pair of steps, the coarse solution takes the pair as one step. :func:`difference` states a
-part of the difference between them as the error at the end of the pair. Both solutions may share an error:
+The fine solution takes a pair of steps, the coarse solution takes the pair as one step. :func:`difference` states their
+difference, times a factor, as the error at the end of the pair. Both solutions may share an error:
 
 - the difference has parts of first and of second order and may pass through zero (:meth:`Difference.at_least`);
 - the pressure of a cell that has just entered the contact is uncertain (:func:`entering`, :func:`entered_early`);
@@ -24,7 +24,7 @@ from roughvisc.mechanics.program import Slide
 from roughvisc.mechanics.scene import SOFT, Array, Point, Scene
 from roughvisc.mechanics.tangential import tangential_force
 
-#: Part of the difference between the fine and the coarse solution that is stated as the error, of pressure and force,
+#: Stated error over the difference between the fine and the coarse solution, of pressure and force,
 #: and of the approach. The difference is three times the error at second order and the error at first order. Measured
 #: on workflows/benchmarks/accuracy.py. Then the same for bodies with hardly any instantaneous compliance, whose first
 #: steps are of first order.

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from roughvisc.mechanics.program import Segment
-from roughvisc.mechanics.scene import SOFT, Point, Scene
+from roughvisc.mechanics.scene import Point, Scene
 from roughvisc.mechanics.stated_error import Difference, stated_parts
 
 #: Length of the first pair after an event, as a part of the segment: contact changes fast after a corner.
@@ -58,6 +58,8 @@ class Pair:
         Fine solution after each step.
     once : Point
         Coarse solution at the end, in one step.
+    is_soft : bool
+        Whether hardly any of the compliance of the pair is instantaneous.
     """
 
     before: Point
@@ -65,6 +67,7 @@ class Pair:
     first: Point
     second: Point
     once: Point
+    is_soft: bool
 
     @property
     def length(self) -> float:
@@ -106,7 +109,7 @@ class Controller:
         ratio : float
             Error that the pair adds, over the allowed error.
         at_row : float
-            Error at a kept row of the pair, over the tolerance; zero if it has none.
+            Error at the end of the pair, over the tolerance, if the end is kept; otherwise zero.
         opens : bool
             Whether contact seems to end although it should not: too long a step may undershoot.
         is_stiff : bool
@@ -234,7 +237,7 @@ def added(scene: Scene, pair: Pair, number: int, following: float, scales: tuple
         Force and approach to which errors are relative. [N, m]
     """
     memory, second, once, taken = scene.memory, pair.second, pair.once, pair.length
-    is_soft, by_load = memory.grows(taken, SOFT), scene.program.segments[number].control == "load"
+    is_soft, by_load = pair.is_soft, scene.program.segments[number].control == "load"
     receding = pair.receding()
     after = second.pressure - once.pressure
     before = pair.before.pressure - pair.coarse_before.pressure

@@ -9,7 +9,7 @@ Errors are weighted by the part that relaxation leaves until the next kept time 
 
 If little of the compliance of a pair is instantaneous, the pair is *soft*. The pressure then jumps in each cell that
 enters the contact, and the pressure of an implicit step belongs to the step and not to its end. The displaced surface
-controls the length of the pair, and a short additional step gives the pressure of a kept row.
+controls the length of the pair too, and a short additional step gives the pressure of a listed kept time.
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ from roughvisc.mechanics.stated_error import (
 from roughvisc.mechanics.step_control import (
     GROW,
     PAIRS_OF_A_CYCLE,
+    ROUNDED,
     Controller,
     Pair,
     errors_over_allowed,
@@ -88,7 +89,7 @@ class State:
     largest_force, largest_approach : float
         Largest values so far. [N, m]
     kept_force, kept_approach : float
-        Largest values at kept times so far, to which the stated errors are relative. [N, m]
+        Largest values of the yielded steps at kept times so far. [N, m]
     solver_error : float
         Largest relative error of the pressure due to the contact solver so far.
     work : float
@@ -186,12 +187,21 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
         elif scene.can_jump:
             steps = [single_step(scene, state, state.fine.time)]
         else:  # the next step takes the jump
-            later = entered(scene, state)
+            later = next_segment(scene, state)
             steps = [Step(later.fine, later.difference, number, later)]
         state = steps[-1].state
         jumps_next = number < state.segment < len(segments) and segments[state.segment].duration == 0
-        if (jumps_next and (scene.can_jump or is_jump)) or (is_jump and not (scene.can_jump or is_start)):
+        comes_again = jumps_next and (scene.can_jump or is_jump)
+        if comes_again or (is_jump and not (scene.can_jump or is_start)):
             steps.pop()
+        rows = [step.point for step in steps if scene.keeps(step.point.time)]
+        state = replace(
+            state,
+            kept_force=max([state.kept_force, *(row.force for row in rows)]),
+            kept_approach=max([state.kept_approach, *(abs(row.approach) for row in rows)]),
+        )
+        if steps and steps[-1].is_end:
+            steps[-1] = steps[-1]._replace(state=state)
         yield from steps
         steps = []  # frees their memory while the next steps are computed
 
@@ -199,7 +209,7 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
 # ---------------------------------------------------------------------------------------------------------- segments
 
 
-def entered(scene: Scene, state: State) -> State:
+def next_segment(scene: Scene, state: State) -> State:
     """Return the state at the start of the next segment.
 
     Without instantaneous compliance the first step of that segment takes a jump of the load before it.
@@ -238,7 +248,9 @@ def single_step(scene: Scene, state: State, time: float) -> Step:
         rule: Rule | None = "linear" if coarse.is_open else None
         other = take_step(scene, coarse, time, number, guess=with_difference(new, coarse, fine), rule=rule)
     error = difference(scene, fine, new, other, scene.motions[number], is_kept=scene.keeps(time))
-    error = replace(error, shared=state.difference.shared * scene.memory.remaining(time - fine.time))
+    left = scene.memory.remaining(time - fine.time)
+    error = error if new.is_open else error.at_least(state.difference, left)
+    error = replace(error, shared=state.difference.shared * left)
     reached, twice = new, other
     if new.is_open and fine.is_open and not fine.is_late:
         reached = without_past(new)
@@ -273,7 +285,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
             return [step_apart(scene, state, closes)]
     if scene.memory.is_elastic:
         longest = (end - began) / 20 if scene.kept is None else math.inf
-        parts = max(math.ceil((event - fine.time) / (scene.time_step or longest) * (1 - 1e-9)), 1)
+        parts = max(math.ceil((event - fine.time) / (scene.time_step or longest) * (1 - ROUNDED)), 1)
         return [single_step(scene, state, fine.time + (event - fine.time) / parts if parts > 1 else event)]
 
     jumped = number > 0 and scene.program.segments[number - 1].duration == 0 and not fine.is_open
@@ -289,11 +301,10 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         slide = scene.motions[number] if times else None
         error = difference(scene, fine, at_end, coarse_at_end, slide, is_kept=bool(times))
         shared = state.difference.shared * scene.memory.remaining(pair.length)
+        if times and not pair.is_soft:  # other pairs cost nothing: their rows carry on what is left of it
+            shared += entered_early(scene, fine, pair.second)
         if scene.time_step is not None:
             break
-        is_soft = scene.memory.grows(pair.length, SOFT)
-        if times and not is_soft:
-            shared += entered_early(scene, fine, pair.second)
         ratio, at_row = errors_over_allowed(scene, pair, number, error, shared, kept, lands=bool(times))
         loses_contact = not fine.is_open and (pair.first.is_open or pair.second.is_open)
         opens = segment.control == "approach" and loses_contact and pair.second.approach >= fine.approach
@@ -308,13 +319,14 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
 def solve_pair(scene: Scene, state: State, middle: float, last: float, *, has_row: bool) -> tuple[Pair, Point, Point]:
     """Return a pair of steps, and both solutions at its end with the pressures at that time if it has a kept row."""
     fine, coarse, number = state.fine, state.twice or state.fine, state.segment
-    is_soft = has_row and scene.memory.grows(last - fine.time, SOFT)
-    share = MAGNIFIED if is_soft else SOLVER_SHARE
+    is_soft = scene.memory.grows(last - fine.time, SOFT)
+    needs_pressure = has_row and is_soft
+    share = MAGNIFIED if needs_pressure else SOLVER_SHARE
     first = take_step(scene, fine, middle, number, share=share)
     second = take_step(scene, first, last, number, share=share)
     once = take_step(scene, coarse, last, number, guess=with_difference(second, coarse, fine), share=share)
-    pair = Pair(fine, coarse, first, second, once)
-    if not is_soft:
+    pair = Pair(fine, coarse, first, second, once, is_soft)
+    if not needs_pressure:
         return pair, second, once
     return pair, with_final_pressure(scene, first, second, number), with_final_pressure(scene, coarse, once, number)
 
@@ -340,8 +352,7 @@ def accepted(
         Length of the next pair. [s]
     """
     fine, memory, number = pair.before, scene.memory, state.segment
-    is_soft = memory.grows(pair.length, SOFT)
-    relaxed = 1.0 if is_soft else memory.remaining(pair.length)
+    relaxed = 1.0 if pair.is_soft else memory.remaining(pair.length)
     error = error.at_least(state.difference, relaxed)
 
     inside = [pair.first]
@@ -359,7 +370,6 @@ def accepted(
         [pair.first, pair.second],
         pair.once,
         length,
-        inside=inside,
         difference=error,
         work=state.work + works[-1],
         work_curved=math.hypot(state.work_curved, last_error),
@@ -367,7 +377,7 @@ def accepted(
 
     steps, apart = [], max(state.work_apart, after.work_apart, key=abs)
     for point, work in zip(inside, works[:-1], strict=True):
-        left = 1.0 if is_soft else memory.remaining(point.time - fine.time)
+        left = 1.0 if pair.is_soft else memory.remaining(point.time - fine.time)
         shared = entering(scene, fine, point) + state.difference.shared * memory.remaining(point.time - fine.time)
         between = replace(error.or_larger(state.difference, left), shared=shared)
         curved = math.hypot(state.work_curved, work_error if point.time <= pair.first.time else last_error)
@@ -378,19 +388,18 @@ def accepted(
 
 def row_at_middle(scene: Scene, pair: Pair, number: int) -> Point:
     """Return the fine solution after the first step of a pair, with the pressure at that time."""
-    is_soft = scene.memory.grows(pair.length, SOFT)
-    return with_final_pressure(scene, pair.before, pair.first, number) if is_soft else pair.first
+    return with_final_pressure(scene, pair.before, pair.first, number) if pair.is_soft else pair.first
 
 
 def row_inside(scene: Scene, pair: Pair, time: float, number: int) -> Point:
     """Return the solution at a kept time inside a pair [s], one step from the point of the fine solution before it."""
     start, end = (pair.before, pair.first) if time < pair.first.time else (pair.first, pair.second)
-    is_soft, weight = scene.memory.grows(pair.length, SOFT), (time - start.time) / (end.time - start.time)
+    weight = (time - start.time) / (end.time - start.time)
     pressure = (1 - weight) * start.pressure + weight * end.pressure
     unit = (1 - weight) * start.history.fields[0] + weight * end.history.fields[0]
-    share = MAGNIFIED if is_soft else SOLVER_SHARE
+    share = MAGNIFIED if pair.is_soft else SOLVER_SHARE
     row = take_step(scene, start, time, number, guess=(pressure, unit), share=share)
-    return with_final_pressure(scene, start, row, number) if is_soft else row
+    return with_final_pressure(scene, start, row, number) if pair.is_soft else row
 
 
 def with_final_pressure(scene: Scene, before: Point, point: Point, number: int) -> Point:
@@ -413,7 +422,6 @@ def after_steps(
     points: list[Point],
     coarse: Point,
     length: float = 0.0,
-    inside: list[Point] | None = None,
     **totals: Any,
 ) -> State:
     """Return the state after accepted steps; at the end of a segment, the state at the start of the next one.
@@ -428,15 +436,12 @@ def after_steps(
         Coarse solution at the end of the last step.
     length : float
         Length of the next pair. [s]
-    inside : list of Point, optional
-        Points inside the pair that may be kept, if not `points`.
     **totals
         Other attributes of the new state: difference, work and its error, distance.
     """
     fine, apart = points[-1], 0.0
     if coarse is not fine:
         apart = work_of_step(scene, state.twice or state.fine, coarse) - work_of_step(scene, state.fine, fine)
-    rows = [point for point in (*(inside or points), fine) if scene.keeps(point.time)]
     reached = replace(
         state,
         fine=fine,
@@ -444,14 +449,12 @@ def after_steps(
         length=length,
         largest_force=max(state.largest_force, points[0].force, fine.force),
         largest_approach=max(state.largest_approach, abs(points[0].approach), abs(fine.approach)),
-        kept_force=max([state.kept_force, *(point.force for point in rows)]),
-        kept_approach=max([state.kept_approach, *(abs(point.approach) for point in rows)]),
         solver_error=max(state.solver_error, *(point.solver_error for point in points), coarse.solver_error),
         work_apart=state.work_apart + apart,
         convolutions=scene.grid.convolutions,
         **totals,
     )
-    return entered(scene, reached) if fine.time == scene.program.corners[state.segment + 1] else reached
+    return next_segment(scene, reached) if fine.time == scene.program.corners[state.segment + 1] else reached
 
 
 # ------------------------------------------------------------------------------------------------------------ slides
@@ -486,7 +489,8 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     if coarse is not fine or count == 2:
         once = over(coarse, count, last.time, with_difference(last, coarse, fine))
 
-    error = difference(scene, fine, last, once, slide, is_kept=scene.keeps(last.time))
+    is_kept = any(scene.keeps(point.time) for point in points[1:])
+    error = difference(scene, fine, last, once, slide, is_kept=is_kept)
     relaxed = memory.remaining(last.time - fine.time)
     shared = state.difference.shared * relaxed
     if count == 1 and not memory.is_elastic:  # the coarse solution takes the same step: both share its error
@@ -502,7 +506,8 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     error = replace(error, shared=shared, friction=max(error.friction, phase))
     work, distance = state.work + works[-1], state.distance + count * side
     after = after_steps(scene, state, points[1:], once, difference=error, work=work, distance=distance)
-    inside = replace(state, work=state.work + works[1], distance=state.distance + side)
+    apart = max(state.work_apart, after.work_apart, key=abs)
+    inside = replace(state, work=state.work + works[1], work_apart=apart, distance=state.distance + side)
     ends = Step(last, error, state.segment, after)
     return [Step(points[1], error.or_larger(state.difference), state.segment, inside, is_end=False), ends][-count:]
 
@@ -616,7 +621,7 @@ def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> 
     if segment.highest(here.start) <= float(scene.gap[scene.solid].min()):
         return event
 
-    def touching(left: float, right: float) -> float | None:
+    def last_apart(left: float, right: float) -> float | None:
         """Return the last time between two times at which the surfaces are still apart; None if they stay apart."""
         surface = scene.gap + scene.memory.after_rest(here.history, right - now)
         level = float(surface[scene.solid].min())
@@ -626,13 +631,13 @@ def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> 
         if right - left <= shortest:
             return left
         middle = 0.5 * (left + right)
-        first = touching(left, middle)
-        return touching(middle, right) if first is None else first
+        first = last_apart(left, middle)
+        return last_apart(middle, right) if first is None else first
 
     shortest = max(CLOSING * (event - now), math.ulp(event))
     turns = [began + time for time in segment.turns(now - began, event - began)]
     for left, right in pairwise((now, *turns, event)):  # the approach is monotone, and the surface only rises
-        closes = touching(left, right)
+        closes = last_apart(left, right)
         if closes is not None:
             return closes if closes - now > AT_ONCE * (event - now) else now
     return event

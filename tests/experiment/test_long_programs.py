@@ -55,4 +55,4 @@ def test_many_segments__give_what_one_segment_gives():
     settings = {"boundary": "periodic", "times": [0.3, 1.0, 1.2, 1.45], "fields": ("pressure",), "progress": False}
     found, expected = (rv.simulate(surface, body, program, **settings) for program in (many, few))
     stated = found.stated_error.values + expected.stated_error.values
-    assert (relative_errors(found, expected) <= stated).all()
+    assert (relative_errors(found, expected) <= 1.5 * stated).all()
