@@ -14,7 +14,6 @@ import types
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache, partial
-from pathlib import Path
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from roughvisc.errors import InputError, short_repr
@@ -252,17 +251,3 @@ def in_words(hint: Any, unit: str = "1") -> str:
         return " or ".join(dict.fromkeys(map(in_words, inner)))
     named = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
     return (named | {tuple: "a list", Sequence: "a list"}).get(kind or hint, "a value")
-
-
-def path_of(key: str, value: Any, what: str) -> Path:
-    """Return an argument as a path; refuse another object, such as a Dataset.
-
-    Raises
-    ------
-    InputError
-        If the value is neither a text nor a path.
-    """
-    try:
-        return Path(value)
-    except TypeError as error:
-        raise InputError(key=key, found=type(value).__name__, expected=f"the path of {what}") from error

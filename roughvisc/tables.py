@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
+from roughvisc.paths import path_of, read_bytes
 from roughvisc.units import number
 
 #: Units of equal dimension that differ by 2 pi: never converted.
@@ -34,23 +35,17 @@ _JPK_NAMES = "# fancyNames:"
 _FIRST = 200
 
 
-def regular(path: Path) -> None:
-    """Refuse a device or a pipe, because reading it may never end."""
-    if path.exists() and not path.is_file() and not path.is_dir():
-        raise InputError(f"{path}: is a device or a pipe: expected a file")
-
-
 def read_text(path: Path) -> str:
     """Return the text of a file in UTF-8, in UTF-16 with a byte-order mark, or else in Windows-1252.
 
     Raises
     ------
-    OSError
-        If the file cannot be read.
+    InputError
+        If it is not a regular file, or cannot be read.
     UnicodeError
         If the file contains zero bytes, such as a binary file or UTF-16 without a byte-order mark.
     """
-    raw = path.read_bytes()
+    raw = read_bytes(path)
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return raw.decode("utf-16")
     if b"\0" in raw:
@@ -169,7 +164,7 @@ def read_table(path: str | Path, wanted: Mapping[str, Wanted]) -> tuple[dict[str
     others. Lines above it are skipped. A column of pure numbers may omit its unit. In a text export of JPK names and
     units are comments before each segment; all segments are read as one table.
     """
-    path = Path(path)
+    path = path_of(path, "path")
     separator, rows = _rows(path)
     needed = [one.name for one in wanted.values() if not one.optional]
     headings = (at for at, (_, cells) in enumerate(rows[:_FIRST]) if all(_places(cells, name) for name in needed))
@@ -204,9 +199,8 @@ def read_table(path: str | Path, wanted: Mapping[str, Wanted]) -> tuple[dict[str
 def _rows(path: Path) -> tuple[str, list[_Row]]:
     """Return the separator of the cells, and the rows without blank lines and comments."""
     try:
-        regular(path)
         text = read_text(path)
-    except (OSError, UnicodeError) as error:
+    except UnicodeError as error:
         raise InputError(f"{path}: cannot be read as a table: {error}") from error
     whole = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip()]
     lines = [(i, line) for i, line in whole if not line.startswith("#")]

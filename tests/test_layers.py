@@ -10,7 +10,7 @@ import roughvisc as rv
 PACKAGE = pathlib.Path(rv.__file__).parent
 #: Parts of each layer, lowest first. Files of one part may import each other.
 LAYERS = (
-    ("arguments errors labels progress tables units variables version",),
+    ("arguments errors labels paths progress tables units variables version",),
     ("mechanics", "topography"),
     ("experiment settings solve",),
     ("observables",),

@@ -17,12 +17,20 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from roughvisc.errors import InputError, RoughviscError, printable
+from roughvisc.paths import path_of
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-#: Type of an argument or option that names a file or a folder.
-PATH = click.Path(path_type=Path)
+
+class _Path(click.Path):
+    """Type of an argument or option that names a file or a folder; empty text is refused."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        return path_of(value, param.get_error_hint(ctx).replace("'", "") if param and ctx else "path")
+
+
+PATH = _Path()
 WORKERS = click.option(
     "--workers", type=click.IntRange(1), help="Number of parallel processes. [default: one per core]"
 )
@@ -122,6 +130,8 @@ def _failure(error: BaseException) -> tuple[str, int] | None:
         case OSError() if error.errno != errno.EPIPE:  # the reader of the output has closed it: click ends quietly
             place = f"{error.filename}: " if error.filename else ""
             return f"{place}{error.strerror or error}", 1
+        case UnicodeEncodeError():
+            return f"the locale of this process lacks letters of a file name ({error}): set LC_ALL=C.UTF-8", 2
         case MemoryError():
             return "not enough memory: run `roughvisc plan STUDY` to see how much the study needs", 1
         case RecursionError():

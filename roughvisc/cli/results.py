@@ -76,7 +76,7 @@ def table(results: Path, out: Path | None) -> None:
         path = out or results / "table.csv"
         cases = rv.to_table(results)
         with atomic_write(path) as temporary:
-            cases.to_csv(temporary)
+            cases.to_csv(temporary, errors="surrogateescape")
     else:
         with rv.open_result(results) as dataset:
             path = rv.to_csv(dataset, out or results.with_suffix(".csv"))

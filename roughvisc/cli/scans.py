@@ -11,6 +11,7 @@ import click
 import roughvisc as rv
 from roughvisc.cli.group import PATH, complain, quantity, say, say_path, screen
 from roughvisc.errors import InputError
+from roughvisc.paths import read_bytes, shell_word
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -66,7 +67,8 @@ def _opened(file: Path, options: dict[str, Any]) -> xr.DataArray:
             return rv.open_scan(file, **options)
         except InputError as error:
             lacks = error.key in _QUESTIONS and options[error.key] is None
-            if not (lacks and sys.stdin.isatty() and sys.stderr.isatty()):
+            # a closed stream is None
+            if not (lacks and all(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stderr))):
                 raise
             question, kind = _QUESTIONS[error.key]
             options[error.key] = click.prompt(f"{file}: {question}", type=kind, err=True)
@@ -141,7 +143,7 @@ def new(file: Path | None, out: Path | None, contact: str, **options: Any) -> No
     """
     from roughvisc.cli.tables import findings_table
     from roughvisc.study.first_study import first_pressure, starter_study
-    from roughvisc.study.storage.folder import write_text
+    from roughvisc.study.storage.folder import atomic_write, write_text
     from roughvisc.topography import EXAMPLE
     from roughvisc.units import number
 
@@ -152,9 +154,10 @@ def new(file: Path | None, out: Path | None, contact: str, **options: Any) -> No
         raise InputError(f"{out}: already exists, or is not a .toml file: expected another name (--out)")
     if file is None:
         shipped = rv.example_scan().read_bytes()
-        if source.exists() and source.read_bytes() != shipped:
+        if source.exists() and read_bytes(source) != shipped:
             raise InputError(f"{source}: already exists and differs from the example: expected your own FILE")
-        source.write_bytes(shipped)
+        with atomic_write(source) as temporary:
+            temporary.write_bytes(shipped)
     height = _opened(source, options)
     found = rv.inspect(height)
     first = first_pressure(height, found, part)
@@ -166,4 +169,4 @@ def new(file: Path | None, out: Path | None, contact: str, **options: Any) -> No
     if file is None:
         say_path(console, "Scan", source)
     say_path(console, "Study", out)
-    say(console, f"Next: roughvisc plan {out}\n      roughvisc run {out}")
+    say(console, f"Next: roughvisc plan {shell_word(out)}\n      roughvisc run {shell_word(out)}")

@@ -15,6 +15,7 @@ import click
 import roughvisc as rv
 from roughvisc.cli.group import PATH, QUIET, WORKERS, Failure, complain, quantity, say, say_figures, say_path, screen
 from roughvisc.errors import InputError
+from roughvisc.paths import regular
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -132,8 +133,8 @@ def connect(address: str | None = None, file: Path | None = None) -> Iterator[Cl
 
     if (address is None) == (file is None):
         raise InputError("found both an address and a file of the scheduler: expected only one")
-    if file is not None and not file.is_file():
-        raise InputError(f"{file}: does not exist: expected the file written by dask scheduler --scheduler-file")
+    if file is not None:
+        regular(file, "the file written by dask scheduler --scheduler-file")
     try:
         where = {"address": address} if file is None else {"scheduler_file": str(file)}
         client = Client(**where, set_as_default=False, timeout="20s")

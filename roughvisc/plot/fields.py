@@ -21,6 +21,7 @@ from roughvisc.arguments import listed_names, one_of
 from roughvisc.errors import InputError
 from roughvisc.observables import contact, leakage
 from roughvisc.observables.frames import expect_result, need
+from roughvisc.paths import path_of
 from roughvisc.plot import style
 from roughvisc.study.storage.folder import atomic_write
 from roughvisc.topography.filters import fill, off_plane
@@ -334,7 +335,7 @@ def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, rate: Q
     InputError
         If the suffix is not supported, ffmpeg is missing, or the result does not hold the field.
     """
-    path = Path(path)
+    path = path_of(path, "path")
     name = field or ("pressure" if "pressure" in dataset else "gap")
     one_of("field", name, FIELDS)
     dataset = expect_result(dataset, "x", "y", name)

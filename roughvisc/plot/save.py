@@ -6,6 +6,7 @@ import json
 import multiprocessing
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -15,8 +16,9 @@ import matplotlib
 import xarray as xr
 from matplotlib.figure import Figure
 
-from roughvisc.errors import InputError
+from roughvisc.errors import InputError, RoughviscError
 from roughvisc.observables.frames import expect_result
+from roughvisc.paths import path_of
 from roughvisc.plot import style
 from roughvisc.plot.curves import friction, history
 from roughvisc.plot.fields import maps, section, surface
@@ -25,7 +27,7 @@ from roughvisc.progress import reporting
 from roughvisc.study.case_text import file_stems
 from roughvisc.study.storage.folder import atomic_write
 from roughvisc.study.storage.netcdf import open_result
-from roughvisc.study.storage.sweep_data import open_results
+from roughvisc.study.storage.sweep_data import open_results, read_sweep
 
 #: Name -> function of a result, variables that it needs, and a caption.
 FIGURES: dict[str, tuple[Callable[[xr.Dataset], Figure], tuple[str, ...], str]] = {
@@ -109,8 +111,9 @@ def save_figures(dataset: xr.Dataset, folder: Any, stem: str, names: Collection[
         If the Dataset is not one case's result or allows no figure.
     """
     dataset = expect_result(dataset)
+    folder = path_of(folder, "folder")
     figures = figures_of(dataset, names)
-    written = [write_figure(figure, Path(folder, f"{stem}-{name}.png")) for name, _, figure in figures]
+    written = [write_figure(figure, folder / f"{stem}-{name}.png") for name, _, figure in figures]
     if not written:
         raise InputError(f"the result allows no figure: it holds {', '.join(map(str, dataset.variables))}")
     return written
@@ -161,14 +164,19 @@ def in_parallel(work: Callable[[Any], Any], jobs: Sequence[Any], processes: int,
     pool = ProcessPoolExecutor(max(min(processes, len(jobs)), 1), multiprocessing.get_context("spawn"))
     with pool, reporting(label, lambda done, count: f"{done:.0f} of {count:.0f} cases") as report:
         results = []
-        for found in pool.map(work, jobs) if min(processes, len(jobs)) > 1 else map(work, jobs):
-            results.append(found)
-            report(len(results), len(jobs))
+        try:
+            for found in pool.map(work, jobs) if min(processes, len(jobs)) > 1 else map(work, jobs):
+                results.append(found)
+                report(len(results), len(jobs))
+        except BrokenProcessPool as error:
+            lost = f"{label}: a process was killed, perhaps because the memory was full: expected more free memory"
+            raise RoughviscError(lost, transient=True) from error
         return results
 
 
 def results_of_sweep(folder: Path) -> xr.Dataset | None:
     """Return the results of the last sweep in a folder; None if there are fewer than two."""
+    read_sweep(folder)  # refuses a list of cases that cannot be read
     with suppress(InputError):
         results = open_results(folder)
         return results if results["case_key"].size > 1 else None
@@ -195,4 +203,5 @@ def save_sweep_figures(results: xr.Dataset, folder: Any) -> list[Path]:
     InputError
         If the Dataset does not hold several cases.
     """
-    return [write_figure(figure, Path(folder, f"sweep-{name}.png")) for name, _, figure in sweep_figures(results)]
+    folder = path_of(folder, "folder")
+    return [write_figure(figure, folder / f"sweep-{name}.png") for name, _, figure in sweep_figures(results)]

@@ -20,13 +20,14 @@ from matplotlib.figure import Figure
 from roughvisc.errors import InputError
 from roughvisc.labels import cost_of, grid_error_of, warnings_of
 from roughvisc.observables.frames import expect_result
+from roughvisc.paths import path_of
 from roughvisc.plot import style
 from roughvisc.plot.fields import surface
 from roughvisc.plot.save import DEFAULT, FIGURES, figures_of, in_parallel, results_of_sweep, varies_surface
 from roughvisc.plot.sweep import sweep_figures
 from roughvisc.study.audit import audit
 from roughvisc.study.case_text import case_words, study_text
-from roughvisc.study.storage.folder import atomic_write, no_results, recorded_failure, result_files
+from roughvisc.study.storage.folder import no_results, recorded_failure, result_files, write_text
 from roughvisc.study.storage.netcdf import open_result
 from roughvisc.study.storage.sweep_data import numbers_of, read_sweep
 from roughvisc.topography.filters import off_plane
@@ -65,11 +66,12 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
         If there are zero results, or a Dataset comes without `out`.
     """
     page: dict[str, Any] = {"failures": {}, "figures": [], "words": case_words, "text": _text}
+    out = out if out is None else path_of(out, "out")
     sources, numbers = [results], {}
     if isinstance(results, xr.Dataset):
         if out is None:
             raise InputError("out is None: expected the name of the page, if a Dataset is given")
-    elif (folder := Path(results)).is_dir():
+    elif (folder := path_of(results, "results")).is_dir():
         out = out or folder / "report.html"
         sources, failed = result_files(folder), (path.name.partition(".")[0] for path in folder.glob("*.failed.json"))
         page["failures"] = {key: recorded_failure(folder, key) for key in sorted(failed)}
@@ -93,9 +95,7 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
     page["written"] = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     page["version"] = metadata.version("roughvisc")
     templates = Environment(loader=PackageLoader("roughvisc.reports", "."), autoescape=True, trim_blocks=True)
-    with atomic_write(out) as temporary:
-        temporary.write_text(templates.get_template("report.html.jinja").render(page), encoding="utf-8")
-    return Path(out)
+    return write_text(Path(out), templates.get_template("report.html.jinja").render(page))
 
 
 @matplotlib.rc_context(style.STYLE)

@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.arguments import a_table, path_of, split
+from roughvisc.arguments import a_table, located, split
 from roughvisc.errors import InputError, RoughviscError, short_repr
 from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.program import Program
+from roughvisc.paths import path_of
 from roughvisc.settings import Settings
 from roughvisc.study.case_text import value_text
 from roughvisc.study.study_file import in_si, parts_of, shift_factor, unit_of, with_files, without_late_times
@@ -256,10 +257,8 @@ def read_cases(path: str | Path) -> list[Case]:
     InputError
         As :func:`read_study` does, for the first case that is wrong; or if a time is after the end of every program.
     """
-    path = path_of("path", path, "a study file")
-    if not path.exists():
-        raise InputError(f"{path}: does not exist: expected a study file (TOML)")
-    data = read_toml(path, "valid TOML")
+    path = path_of(path, "path", "a study file")
+    data = read_toml(path, "a study in TOML")
     try:
         changes = sweep_changes(data.pop("sweep"), data, path.parent) if "sweep" in data else [({}, {})]
     except InputError as error:
@@ -390,9 +389,8 @@ def checksums_of(surface: Mapping[str, Any]) -> list[tuple[str, str]]:
         scan = measured_file(path)
         try:
             found.append((_digest(card) if scan is None else sha256(scan), _digest(card) if card else ""))
-        except OSError as error:
-            message = f"surface.file: {path}: cannot be read: {error.strerror or error}"
-            raise InputError(message, key="surface.file", found=str(path), expected="a scan file") from error
+        except InputError as error:
+            raise located(error, "surface.file") from error
     return found
 
 

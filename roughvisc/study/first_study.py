@@ -15,6 +15,7 @@ from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.contact.solver import contact_area, solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.materials.prony import zener
+from roughvisc.paths import shell_word
 from roughvisc.topography.conditioning import condition
 from roughvisc.topography.grid import rms_slope
 from roughvisc.topography.inspection import Inspection
@@ -147,7 +148,7 @@ def starter_study(
     return TEMPLATE.read_text(encoding="utf-8").format(
         title=Path(file).stem.replace("_", " ").replace("\\", "").replace('"', ""),
         name=Path(file).name,
-        study=Path(study).name,
+        study=shell_word(Path(Path(study).name)),
         surface=surface_table(file, Path(study).parent, options, found.steps),
         contact=f"{100 * first.contact:.3g}",
         miss=f"# {first.miss}\n" if first.miss else "",

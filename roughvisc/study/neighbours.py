@@ -23,6 +23,7 @@ from roughvisc.errors import InputError, RoughviscError
 from roughvisc.experiment.grid_error import coarser_shape
 from roughvisc.experiment.loading import Loading
 from roughvisc.observables import conductance, leakage
+from roughvisc.paths import path_of
 from roughvisc.study.case import Case, case_given, vary
 from roughvisc.study.execution.run import is_result_of, result_folder
 from roughvisc.study.execution.sweep import Display, run_cases
@@ -601,7 +602,7 @@ def budget(
         raise InputError(key="quantity", found=quantity, expected="at least one")
     case = case_given(case)
     finished = case_path(result_folder(case), case.key, "result")
-    folder = Path(out).expanduser() if out is not None else finished.parent / FOLDER
+    folder = path_of(out, "out").expanduser() if out is not None else finished.parent / FOLDER
     observed = [quantity_of(case, name) for name in names]
     base, own = with_kept(case, [field for one in observed for field in one.fields]), None
     if set(base.settings.fields) <= set(case.settings.fields) and is_result_of(case, finished):

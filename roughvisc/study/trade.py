@@ -15,6 +15,7 @@ from roughvisc.errors import InputError
 from roughvisc.experiment.grid_error import TWO_GRIDS, grid_uncertainty, pressure_distance
 from roughvisc.experiment.loading import Loading
 from roughvisc.labels import cost_of
+from roughvisc.paths import path_of
 from roughvisc.settings import kept_times
 from roughvisc.study.case import Case, case_given, vary
 from roughvisc.study.execution.run import result_folder
@@ -128,7 +129,7 @@ def trade(
         sides = np.array(spacing(height)) * height.shape / np.array(list(shapes.values()))
         times = kept_times(experiment.program, times, *map(tuple, sides))
     base = with_kept(case, ["pressure", *(field for one in observed for field in one.fields)], times)
-    folder = Path(out).expanduser() if out is not None else result_folder(case) / FOLDER
+    folder = path_of(out, "out").expanduser() if out is not None else result_folder(case) / FOLDER
     cases = {one: on_cells(vary(base, {"solve.tolerance": one[0]}), height, one[1]) for one in wanted}
     solved = solve(cases.values(), folder, progress=progress)
     results = {}

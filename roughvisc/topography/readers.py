@@ -19,7 +19,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.tables import regular
+from roughvisc.paths import cause_of_system, opened, path_of, regular, unreadable
 from roughvisc.topography.formats import TOP_FIRST, open_file, orientation
 from roughvisc.topography.formats.scan_file import Channel, ScanFile
 from roughvisc.topography.grid import MOST_CELLS, checked, in_metres, labelled, noted, pair, with_coordinates
@@ -213,18 +213,14 @@ def from_array(heights: Any, spacing: Quantity | tuple[Quantity, Quantity]) -> x
 
 def sha256(path: Path) -> str:
     """Return the checksum of the content of a file."""
-    regular(path)
-    with path.open("rb") as stream:
+    with opened(path, "a scan file") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def existing(path: Any) -> Path:
+def existing(path: Any, key: str = "path") -> Path:
     """Return the path of an existing file; raise :class:`~roughvisc.errors.InputError` otherwise."""
-    path = Path(path)
-    regular(path)
-    if not path.is_file():
-        found = "a folder" if path.is_dir() else "no file"
-        raise InputError(f"{path}: found {found}: expected a scan file or a surface card")
+    path = path_of(path, key)
+    regular(path, "a scan file or a surface card")
     return path
 
 
@@ -241,6 +237,8 @@ def _reading(path: Path) -> Iterator[None]:
         except InputError as error:
             raise error.prefixed(str(path)) from error
         except Exception as error:  # damaged files raise many types, such as MemoryError and struct.error
+            if cause := cause_of_system(error):
+                raise unreadable(path, cause, "a scan file") from error
             found = textwrap.shorten(str(error), 200, placeholder="...") or type(error).__name__
             text = f"{path}: it cannot be read ({found}): the file is damaged, or of another format"
             raise InputError(text) from error

@@ -11,6 +11,7 @@ import os
 import tomllib
 from collections.abc import Mapping
 from importlib import import_module
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,7 @@ from roughvisc.arguments import (
     split,
 )
 from roughvisc.errors import InputError
-from roughvisc.tables import regular
+from roughvisc.paths import path_of, read_bytes
 from roughvisc.topography.conditioning import FACE_STEPS, STEPS, boundary_after, condition
 from roughvisc.topography.framing import combine
 from roughvisc.topography.grid import checked
@@ -119,7 +120,7 @@ def open_scan(
     try:
         one_key("the card", table, ("file", "generate"))
         stated, file = about.pop("sha256", None), table.get("file")
-        if stated and file and stated.lower() != (found := sha256(existing(file))):
+        if stated and file and stated.lower() != (found := sha256(existing(file, "file"))):
             expected = f"{found}, that of {Path(file).name}, which was changed or damaged"
             raise InputError(key="sha256", found=stated, expected=expected)
         h = condition(raw_height("", table), split(table, *STEPS)[0])
@@ -144,7 +145,7 @@ def save_scan(h: xr.DataArray, path: _Path) -> None:
     InputError
         If the suffix is unknown, or `h` is not a height grid.
     """
-    h, path = checked(h, "save_scan"), Path(path)
+    h, path = checked(h, "save_scan"), path_of(path, "path")
     known_suffix(path)
     if path.suffix.lower() == ".nc":
         compressed: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
@@ -171,7 +172,7 @@ def read_card(path: Path) -> tuple[dict[str, str], dict[str, Any]]:
     """
     about, table = split(read_toml(path, "a surface card in TOML"), *PROVENANCE, "sha256")
     for key, value in {**about, **split(table, "file", "generate")[0]}.items():
-        if not isinstance(value, str):
+        if not isinstance(value, str) or (key == "file" and not value):
             raise InputError(f"{path}: {key}: found {value!r}: expected a text", key=key, found=value)
     if "file" in table:
         table["file"] = str(path.parent / table["file"])
@@ -209,14 +210,10 @@ def read_toml(path: Path, wanted: str) -> dict[str, Any]:
     InputError
         If it is not a regular file, cannot be read, or is not `wanted`.
     """
-    regular(path)
+    content = read_bytes(path, wanted)
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (
-        OSError,
-        ValueError,
-        RecursionError,
-    ) as error:  # for example an integer of thousands of digits
+        return tomllib.loads(TextIOWrapper(BytesIO(content), "utf-8-sig").read())
+    except (ValueError, RecursionError) as error:  # for example an integer of thousands of digits
         raise InputError(f"{path}: is not {wanted}: {error}: expected TOML in UTF-8") from error
 
 

@@ -82,7 +82,7 @@ def test_open__devices_and_pipes_are_refused(tmp_path, kind):
         lambda: read_table(place, {"time": Wanted("time", "s")}),
         lambda: read_study(place),
     ):
-        with pytest.raises(InputError, match=r"endless: is a device or a pipe: expected a file"):
+        with pytest.raises(InputError, match=r"endless: is a device or a pipe: "):
             read()
 
 

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from roughvisc.arguments import split
 from roughvisc.errors import InputError, RoughviscError
 from roughvisc.labels import warnings_of
+from roughvisc.paths import path_of
 from roughvisc.settings import Problem
 from roughvisc.solve import Progress, solve
 from roughvisc.study.case import Case, labels_of
@@ -58,10 +59,10 @@ def result_folder(case: Case, out: str | Path | None = None) -> Path:
     Raises
     ------
     InputError
-        If the path is a file, or lies below a file.
+        If the path is empty, is a file, or lies below a file.
     """
     if out is not None:
-        folder = Path(out).expanduser()
+        folder = path_of(out, "out").expanduser()
     elif case.origin is not None:
         folder = case.origin.parent / "results" / case.origin.stem
     else:

@@ -192,8 +192,8 @@ def run_cases(
     folder.mkdir(parents=True, exist_ok=True)
     clean_folder(folder)
     listed = sweep_cases(cases)
-    write_json(folder / SWEEP, listed)
     with log_file(folder):
+        write_json(folder / SWEEP, listed)
         index, outcomes = index_of(folder), dict[str, Outcome]()
         for key in distinct:
             if entry := index.get(key):
@@ -274,10 +274,13 @@ def _record(outcome: Outcome, case: Case, folder: Path) -> None:
     log.log(level, "%s %s %.3g s %s %s", *told)
     for text in warnings_of(outcome.entry.attributes).values() if outcome.entry else ():
         log.info("%s: %s", outcome.key, text)
-    if outcome.entry:
-        case_path(folder, outcome.key, "failure").unlink(missing_ok=True)  # the case failed before
-    elif outcome.kind == "failed":
-        record_failure(folder, case, message=outcome.message, error=outcome.error, traceback=outcome.trace)
+    try:
+        if outcome.entry:
+            case_path(folder, outcome.key, "failure").unlink(missing_ok=True)  # the case failed before
+        elif outcome.kind == "failed":
+            record_failure(folder, case, message=outcome.message, error=outcome.error, traceback=outcome.trace)
+    except (OSError, InputError) as error:  # must not stop the other cases
+        log.warning("%s: its record of a failure cannot be changed: %s", outcome.key, error)
 
 
 class Display:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import shutil
 import time
 import zipfile
@@ -21,9 +22,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from roughvisc.errors import InputError
 from roughvisc.experiment.base import Row
 from roughvisc.experiment.loading import STATES
 from roughvisc.mechanics.grid import to_host
+from roughvisc.paths import opened
 from roughvisc.solve import Checkpoint, Recorder
 from roughvisc.study.storage.folder import DAMAGED, STATE, atomic_write
 from roughvisc.study.storage.netcdf import lazy
@@ -109,9 +112,15 @@ class CheckpointWriter(Recorder):
         return lazy(read, (len(rows), *shape))
 
     def resume(self) -> None:
-        """Continue from the checkpoint if it is undamaged, otherwise from the start."""
+        """Continue from the checkpoint if it is undamaged, otherwise from the start.
+
+        Raises
+        ------
+        InputError
+            If the system cannot read the checkpoint, which is then kept.
+        """
         path = self._folder / STATE
-        if not path.exists():
+        if not os.path.lexists(path):
             return  # rows without a state are overwritten
         try:
             plain = _read(path)
@@ -125,6 +134,8 @@ class CheckpointWriter(Recorder):
             count = self.latest.rows  # rows after the state are computed again
             self.plain, self._ends = rows[:count], [min(end, count) for end in ends]
             log.info("%s: goes on from here", path)
+        except InputError:
+            raise
         except _DAMAGED as error:
             log.warning("%s: is damaged and not used: %s", path, error)
             self.restart()
@@ -199,9 +210,6 @@ def _write(path: Path, plain: Any, arrays: Mapping[str, Array]) -> None:
 
 def _read(path: Path) -> Any:
     """Return the plain values and states of a file."""
-    with zipfile.ZipFile(path) as archive:
-        if damaged := archive.testzip():  # np.load would allocate the shape of a damaged header
-            raise ValueError(f"{path.name}, {damaged}")
 
     def decoded(value: dict[str, Any]) -> Any:
         if "array" in value:
@@ -210,8 +218,13 @@ def _read(path: Path) -> Any:
             return _KINDS[value["type"]](**{name: _tuples(part) for name, part in value["parts"].items()})
         return value
 
-    with np.load(path, allow_pickle=False) as found:
-        arrays = dict(found)
+    with opened(path, "a checkpoint") as stream:
+        with zipfile.ZipFile(stream) as archive:
+            if damaged := archive.testzip():  # np.load would allocate the shape of a damaged header
+                raise ValueError(f"{path.name}, {damaged}")
+        stream.seek(0)
+        with np.load(stream, allow_pickle=False) as found:
+            arrays = dict(found)
     return json.loads(arrays[_PLAIN].tobytes(), object_hook=decoded)
 
 

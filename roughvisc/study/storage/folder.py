@@ -25,6 +25,7 @@ from typing import Any, Literal
 from filelock import FileLock, Timeout
 
 from roughvisc.errors import InputError
+from roughvisc.paths import flaw_of, path_of, read_bytes, regular
 from roughvisc.study.case import Case
 
 log = logging.getLogger("roughvisc")
@@ -101,16 +102,10 @@ def unusable(path: Path, found: str, expected: str = "a result of roughvisc (.nc
     return InputError(text, key=str(path), found=found, expected=expected, transient=True)
 
 
-def require_file(path: Path) -> None:
-    """Refuse a path that is not a regular file, because opening a pipe may never return.
-
-    Raises
-    ------
-    InputError
-        If the file is absent, a folder, a pipe or a device.
-    """
-    if not os.path.isfile(path):
-        raise unusable(path, "is no regular file" if os.path.exists(path) else "does not exist")
+def require_result(path: Path) -> None:
+    """Refuse a path that is not a regular file; the key of the error is the path."""
+    if flaw := flaw_of(path):
+        raise unusable(path, flaw)
 
 
 @contextmanager
@@ -130,9 +125,11 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
     Raises
     ------
     InputError
-        If the folder cannot be created or written to.
+        If the path is a folder, a pipe or a device, or its folder cannot be created or written to.
     """
-    path = Path(path)
+    path = path_of(path, "path")
+    if os.path.exists(path) and (flaw := flaw_of(path)):  # a rename would remove a device, and fails on a folder
+        raise InputError(f"{path}: {flaw}: expected a file to replace, or another name", transient=True)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -153,7 +150,7 @@ def atomic_write(path: str | Path) -> Iterator[Path]:
 def write_text(path: Path, text: str) -> Path:
     """Write a text to a file atomically."""
     with atomic_write(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8", errors="surrogateescape")  # as in the names of files
     return path
 
 
@@ -178,7 +175,7 @@ def write_json(path: Path, value: Any, default: Callable[[Any], Any] | None = No
 
 def read_json(path: Path) -> Any:
     """Return the value of a compressed JSON file; raise one of :data:`DAMAGED` if it is damaged."""
-    return json.loads(gzip.decompress(path.read_bytes()))
+    return json.loads(gzip.decompress(read_bytes(path)))
 
 
 @contextmanager
@@ -220,8 +217,8 @@ def record_failure(folder: Path, case: Case, **what: str) -> None:
 def recorded_failure(folder: Path, key: str) -> dict[str, Any]:
     """Return the record of a failed case; empty without a readable record."""
     try:
-        return dict(json.loads(case_path(folder, key, "failure").read_text()))
-    except (OSError, ValueError, TypeError):
+        return dict(json.loads(read_bytes(case_path(folder, key, "failure"))))
+    except (ValueError, TypeError):
         return {}
 
 
@@ -233,7 +230,10 @@ class _LogFile(logging.FileHandler):
 @contextmanager
 def log_file(folder: Path) -> Iterator[None]:
     """Append all log messages of roughvisc to a file next to the results, within the block."""
-    level, handler = log.level, _LogFile(folder / LOG, encoding="utf-8")
+    path = folder / LOG
+    if os.path.lexists(path):
+        regular(path, "a file for the log")
+    level, handler = log.level, _LogFile(path, encoding="utf-8", errors="backslashreplace")
     handler.setFormatter(logging.Formatter(f"%(asctime)s {os.getpid()} %(levelname)s %(message)s"))
     log.addHandler(handler)
     log.setLevel(min(level or logging.INFO, logging.INFO))
@@ -267,7 +267,7 @@ def clean_folder(folder: str | Path, *, everything: bool = False) -> list[Path]:
     InputError
         If the folder does not exist.
     """
-    folder = Path(folder)
+    folder = path_of(folder, "folder")
     if not folder.is_dir():
         raise no_results(folder)
     removed: list[Path] = []

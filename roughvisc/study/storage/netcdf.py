@@ -11,7 +11,7 @@ import errno
 import math
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -25,10 +25,10 @@ from xarray.backends import BackendArray, BackendEntrypoint
 from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK as NETCDF
 from xarray.core import indexing
 
-from roughvisc.arguments import path_of
 from roughvisc.errors import InputError
 from roughvisc.labels import CARRIED, STEPS, label, steps_of
-from roughvisc.study.storage.folder import atomic_write, require_file, results_at, unusable
+from roughvisc.paths import cause_of_system, path_of
+from roughvisc.study.storage.folder import atomic_write, require_result, results_at, unusable
 from roughvisc.variables import AXES, RESULT_FORMAT, VARIABLES, axis_of
 
 #: Errors of the library for a file that it cannot read.
@@ -60,8 +60,13 @@ class DamagedError(InputError):
 
 def unreadable(path: Path, error: Exception, what: str = "") -> InputError:
     """Return the error of a file that the library could not read: a system error, or damaged content."""
-    if isinstance(error, OSError) and (error.errno or 0) > 0:  # errors of the library have negative numbers
-        return unusable(path, f"cannot be read: {error.strerror or error}")
+    try:
+        with path.open("rb"):  # the library reports some causes, such as too many open files, as damage
+            cause = cause_of_system(error)
+    except OSError as failure:
+        cause = cause_of_system(failure)
+    if cause:
+        return unusable(path, cause)
     reason = f"{what}{error}"
     text = f"{path}: is damaged: {reason}: expected a whole result; remove the file and run its study again"
     return DamagedError(text, key=str(path), found=reason, transient=True)
@@ -92,8 +97,8 @@ def open_result(path: str | Path) -> xr.Dataset:
     Every block of a variable has a checksum (fletcher32), which is verified when the block is read. This function reads
     only the histories. :func:`verify` reads all blocks.
     """
-    path = path_of("path", path, "a result")
-    require_file(path)
+    path = path_of(path, "path", "a result")
+    require_result(path)
     try:
         dataset = xr.open_dataset(path, engine=ResultBackend)
     except ERRORS as error:
@@ -113,7 +118,7 @@ class ResultBackend(BackendEntrypoint):
     def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = None) -> xr.Dataset:
         """Open a file as the engine ``netcdf4`` does, with durations as plain numbers."""
         path = os.path.abspath(os.fspath(filename_or_obj))  # other processes may work in another folder
-        with NETCDF, netCDF4.Dataset(path) as file:
+        with NETCDF, netCDF4.Dataset(**_named(path)) as file:
             file.set_auto_maskandscale(False)
             file.set_auto_chartostring(False)
             result = _dataset(path, file).drop_vars(drop_variables or (), errors="ignore")
@@ -121,6 +126,11 @@ class ResultBackend(BackendEntrypoint):
         if steps is not None:
             result.encoding[CARRIED] = steps.set_coords("time")
         return result
+
+
+def _named(path: str | Path) -> dict[str, str]:
+    """Return the arguments of the library for a path, by which it opens the same bytes as Python in any locale."""
+    return {"filename": os.fsencode(path).decode("latin-1"), "encoding": "latin-1"}
 
 
 def _dataset(path: str, file: netCDF4.Dataset) -> xr.Dataset:
@@ -184,9 +194,9 @@ def read_variable(path: str, name: str, key: Any) -> NDArray[Any]:
     DamagedError
         If a block does not match its checksum, or the file lacks the variable.
     """
-    require_file(Path(path))
+    require_result(Path(path))
     try:
-        with NETCDF, netCDF4.Dataset(path) as file:
+        with NETCDF, netCDF4.Dataset(**_named(path)) as file:
             file.set_auto_maskandscale(False)
             return np.asarray(file[name][key])
     except ERRORS as error:
@@ -211,7 +221,7 @@ def verify(place: str | Path) -> dict[Path, str]:
     InputError
         If the path does not exist, or the folder contains no result.
     """
-    place, flaws = path_of("place", place, "a result, or of a folder of results"), {}
+    place, flaws = path_of(place, "place", "a result, or of a folder of results"), {}
     if not place.exists():
         raise InputError(f"{place}: does not exist: expected a result, or a folder of results")
     for path in results_at(place):
@@ -261,7 +271,7 @@ def write_result(dataset: xr.Dataset, path: str | Path) -> Path:
     with atomic_write(path) as temporary:
         try:
             with NETCDF:
-                file = netCDF4.Dataset(temporary, "w", format="NETCDF4")
+                file = netCDF4.Dataset(**_named(temporary), mode="w", format="NETCDF4")
             try:
                 # all variables are declared before values are written: each change of mode writes the metadata again
                 with NETCDF:
@@ -284,7 +294,7 @@ def write_result(dataset: xr.Dataset, path: str | Path) -> Path:
 
 def _declare(place: netCDF4.Dataset, part: xr.Dataset) -> list[tuple[netCDF4.Variable, xr.Variable]]:
     """Declare the variables of a file or a group; return each with the values to write."""
-    place.setncatts(part.attrs)
+    place.setncatts(_readable(part.attrs))
     declared = []
     for name, variable in part.variables.items():
         attributes = dict(variable.attrs)
@@ -295,7 +305,7 @@ def _declare(place: netCDF4.Dataset, part: xr.Dataset) -> list[tuple[netCDF4.Var
         if variable.dtype.kind == "U":
             # characters along a dimension, as xarray and CF read text: netCDF4 1.7.5 crashes on strings of any length
             # if a file is open twice and one is closed
-            characters = netCDF4.stringtochar(np.char.encode(variable.values, "utf-8"))
+            characters = netCDF4.stringtochar(np.char.encode(variable.values, "utf-8", "surrogateescape"))
             variable = xr.Variable((*variable.dims, f"string{characters.shape[-1]}"), characters)
             attributes["_Encoding"] = "utf-8"
         for dimension, size in variable.sizes.items():
@@ -312,9 +322,18 @@ def _declare(place: netCDF4.Dataset, part: xr.Dataset) -> list[tuple[netCDF4.Var
         stored.set_auto_maskandscale(False)
         if "chunksizes" in encoding:  # chunks are written whole; by default the library caches 64 MB per variable
             stored.set_var_chunk_cache(size=math.prod(encoding["chunksizes"]) * variable.dtype.itemsize)
-        stored.setncatts(attributes)
+        stored.setncatts(_readable(attributes))
         declared.append((stored, variable))
     return declared
+
+
+def _readable(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return attributes in which file names of another encoding than the locale's are text in UTF-8."""
+    readable = {}
+    for name, value in attributes.items():
+        is_text = isinstance(value, str)
+        readable[name] = value.encode(errors="surrogateescape").decode(errors="backslashreplace") if is_text else value
+    return readable
 
 
 def chunks(shape: tuple[int, ...]) -> tuple[int, ...]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 from base64 import b64decode, b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -22,10 +23,10 @@ import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
-from roughvisc.arguments import path_of
 from roughvisc.errors import InputError
 from roughvisc.labels import ATTRIBUTES, CARRIED, heading, label, steps_of
 from roughvisc.observables.frames import expect_result
+from roughvisc.paths import path_of
 from roughvisc.study.case import Case, identifier, labels_of, parameters_of
 from roughvisc.study.storage.folder import (
     DAMAGED,
@@ -187,15 +188,17 @@ def read_sweep(folder: Path) -> dict[str, dict[str, Any]]:
     Raises
     ------
     InputError
-        If the list of cases is damaged.
+        If the list of cases is not a regular file, cannot be read, or is damaged.
     """
     path = folder / SWEEP
+    if not os.path.lexists(path):
+        return {}
     try:
         return dict(read_json(path))
-    except FileNotFoundError:
-        return {}
+    except InputError:
+        raise
     except DAMAGED as error:
-        found = f"cannot be read, or is damaged ({error})"
+        found = f"is damaged ({error})"
         raise InputError(f"{path}: {found}: expected the cases of a sweep; run it again", key=SWEEP) from error
 
 
@@ -252,7 +255,7 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.
     >>> results = rv.open_results("results/load_sweep")  # doctest: +SKIP
     >>> results.set_index(case=["program_0_load", "surface_seed"]).unstack("case").contact_area  # doctest: +SKIP
     """
-    folder = path_of("out", out, "a folder of results").absolute()
+    folder = path_of(out, "out", "a folder of results").absolute()
     index = index_of(folder)
     listed = read_sweep(folder) if cases is None else sweep_cases(cases)
     listed = listed or {key: entry.case for key, entry in index.items()}
@@ -411,7 +414,7 @@ def to_table(out: str | Path) -> pd.DataFrame:
     --------
     >>> rv.to_table("results/load_sweep").to_excel("load_sweep.xlsx")  # doctest: +SKIP
     """
-    folder = path_of("out", out, "a folder of results; rv.to_csv takes a Dataset").absolute()
+    folder = path_of(out, "out", "a folder of results; rv.to_csv takes a Dataset").absolute()
     index, cases = index_of(folder), read_sweep(folder)
     if not index and not cases:
         raise no_results(folder)
@@ -444,7 +447,7 @@ def write_table(folder: Path) -> None:
     try:
         with atomic_write(folder / CASES) as temporary:
             # spreadsheets need the byte-order mark of UTF-8; errors exceed the seventh digit
-            to_table(folder).to_csv(temporary, encoding="utf-8-sig", float_format="%.7g")
+            to_table(folder).to_csv(temporary, encoding="utf-8-sig", errors="surrogateescape", float_format="%.7g")
     except (OSError, InputError) as error:
         log.warning("%s cannot be written: %s", folder / CASES, error)
 
@@ -483,5 +486,5 @@ def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:
             table[name] = [meanings[value] for value in table[name]]
     headings = [heading(str(name), dataset[name].attrs.get("units", "")) for name in (rows, *names)]
     with atomic_write(path) as temporary:
-        table.to_csv(temporary, header=headings[1:], index_label=headings[0])
+        table.to_csv(temporary, header=headings[1:], index_label=headings[0], errors="surrogateescape")
     return Path(path)

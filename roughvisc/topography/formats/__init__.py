@@ -14,6 +14,7 @@ from pathlib import Path
 
 from roughvisc.arguments import listed_names
 from roughvisc.errors import InputError
+from roughvisc.paths import cause_of_system
 from roughvisc.topography.formats import binary, text
 from roughvisc.topography.formats.scan_file import Channel, ScanFile
 
@@ -73,9 +74,9 @@ def open_file(path: Path, format: str | None) -> ScanFile:
             file = _FORMATS.get(name, ((), default))[1](path)
             if name == names[-1] or any(channel.is_height for channel in file.channels):
                 return file
-        except InputError:
-            raise
         except Exception as error:  # readers raise many types, such as struct.error and KeyError
+            if isinstance(error, InputError) or cause_of_system(error):
+                raise
             if unit := re.match(r"Unknown unit '(.*)'", str(error)):
                 expected = "a map of heights, and no image of intensity or of another quantity"
                 raise InputError(
