@@ -3,6 +3,7 @@
 import io
 import math
 import os
+import shlex
 import subprocess
 import sys
 import tomllib
@@ -190,6 +191,17 @@ def test_new__of_a_scan_that_misses_its_contact_warns(invoke, tmp_path):
     assert warned.partition("warning: ")[2] in (tmp_path / "plateaus-study.toml").read_text()
 
 
+def test_new__prints_commands_that_run_for_any_name(invoke, tmp_path, scan_file):
+    scan_file.rename(tmp_path / "-5 it's $PWD.nc")
+    _, out, _ = invoke("new", "./-5 it's $PWD.nc")
+    printed = [line.partition("roughvisc ")[2] for line in out.splitlines() if "roughvisc plan" in line]
+    study = tmp_path / "-5 it's $PWD-study.toml"
+    printed += [line.partition("roughvisc ")[2].partition("   ")[0] for line in study.read_text().splitlines()[1:3]]
+    assert [shlex.split(line)[0] for line in printed] == ["plan", "plan", "run"]
+    for line in printed:
+        assert main.commands["plan"].make_context("plan", shlex.split(line)[1:]).params["study"].samefile(study)
+
+
 def test_new__without_a_file_begins_with_an_example(invoke, tmp_path):
     status, out, err = invoke("new")
     assert (status, err) == (0, "")
@@ -299,8 +311,9 @@ def test_new__asks_a_person_for_what_a_file_does_not_state_and_keeps_the_answers
     (case,) = read_cases(tmp_path / "plain-study.toml")
     assert float(raw_height("surface", case.surface).x[0]) == 5e-7
     (tmp_path / "plain-study.toml").unlink()
-    alone = subprocess.run(command, cwd=tmp_path, stdin=subprocess.DEVNULL, capture_output=True, text=True)
-    assert (alone.returncode, "expected unit" in alone.stderr) == (2, True)
+    closed = ["sh", "-c", 'exec "$@" <&-', "sh", *command]  # a closed stream is None
+    alone = subprocess.run(closed, cwd=tmp_path, capture_output=True, text=True)
+    assert (alone.returncode, alone.stderr.count("\n"), "expected unit" in alone.stderr) == (2, 1, True)
 
 
 @pytest.mark.thorough

@@ -1,4 +1,4 @@
-"""Pipes, folders and dangling links under the names of a results folder; file names of another locale; no more files."""
+"""Files that cannot be opened: pipes and folders under names of results, names of another locale, empty paths."""
 
 import os
 import resource
@@ -10,6 +10,8 @@ import pytest
 from support import SMALL, refused
 
 import roughvisc as rv
+from roughvisc.cli import main
+from roughvisc.cli.group import PATH
 from roughvisc.errors import RoughviscError
 from roughvisc.plot.save import in_parallel
 from roughvisc.study.execution.run import run_case
@@ -104,6 +106,46 @@ def test_no_regular_file__under_any_name_ends_in_one_sentence(
             shutil.rmtree(out)
     with refused(found=str(tmp_path)):
         rv.read_study(tmp_path)
+
+
+def test_empty_path__is_refused_by_every_option(invoke, tmp_path):
+    """It would be the current folder."""
+    (tmp_path / "0123456789abcdef.failed.json").write_text("{}")
+    tried = 0
+    for command in main.commands.values():
+        for place, option in enumerate(one for one in command.params if isinstance(one.type, type(PATH))):
+            named = [option.opts[0]] if option.opts[0].startswith("-") else []
+            before = [] if place == 0 else ["x"]
+            status, out, err = invoke(command.name, *before, *named, "")
+            assert (status, out, err.count("\n"), ": found ''" in err) == (2, "", 1, True), (command.name, named, err)
+            tried += 1
+    assert tried > 20
+    assert [one.name for one in tmp_path.iterdir()] == ["0123456789abcdef.failed.json"]
+
+
+def test_empty_path__is_refused_by_every_function(swept, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    case = rv.read_cases(swept[0] / "two.toml")[0]
+    ds = rv.open_result(swept[0] / "out" / f"{case.key}.nc")
+    reads = (rv.open_scan, rv.read_study, rv.read_cases, rv.read_program, rv.open_result, rv.run, rv.sweep, rv.plan)
+    calls = [("path", read) for read in reads]
+    calls += [("out", rv.open_results), ("out", rv.to_table), ("results", rv.report)]
+    calls += [("path", lambda path: rv.to_csv(ds, path)), ("path", lambda path: rv.plot.animate(ds, path))]
+    calls += [("path", lambda path: rv.save_scan(ds.height, path)), ("out", lambda out: rv.report(ds, out))]
+    for function in (rv.run, rv.trade, rv.budget):
+        calls.append(("out", lambda out, function=function: function(case, out=out, progress=False)))
+    for function in (rv.sweep, rv.plan, rv.observe):
+        calls.append(("out", lambda out, function=function: function([case], out)))
+    for key, call in calls:
+        with refused(key, ""):
+            call("")
+    for key in ("surface", "surface.second"):
+        with refused(f"{key}.file", ""):
+            rv.vary(case, {f"{key}": {"file": ""}} if key == "surface" else {key: {"file": "", "level": 1}})
+    (tmp_path / "card.toml").write_text('file = ""')
+    with refused("file", ""):
+        rv.open_scan(tmp_path / "card.toml")
+    assert [one.name for one in tmp_path.iterdir()] == ["card.toml"]
 
 
 def test_process_of_a_pool__that_is_killed_is_one_sentence():
