@@ -103,6 +103,18 @@ def default_client() -> Client | None:
     return None
 
 
+def require_synchronous(client: Client | None) -> None:
+    """Refuse an asynchronous client, whose results cannot be waited for.
+
+    Raises
+    ------
+    InputError
+        If the client is asynchronous.
+    """
+    if client is not None and client.asynchronous:
+        raise InputError(key="client", found=client, expected="a Client(asynchronous=False)")
+
+
 def require_same_version(client: Client) -> None:
     """Refuse a cluster in which a worker has another version of roughvisc, or none.
 

@@ -31,6 +31,7 @@ from roughvisc.study.execution.cluster import (
     distribute,
     local_client,
     require_same_version,
+    require_synchronous,
     threads_each,
 )
 from roughvisc.study.execution.run import FULL, REFUSED, Outcome, attempt, outcome_of, result_folder, run_case
@@ -98,8 +99,9 @@ def sweep(
     Raises
     ------
     InputError
-        If the input is invalid (nothing runs), the call is at the top level of a script, some results lie over time
-        and others over speed, or a quantity in ``[observe]`` cannot be computed from a result (the results are kept).
+        If the input is invalid or the client asynchronous (nothing runs), the call is at the top level of a script,
+        some results lie over time and others over speed, or a quantity in ``[observe]`` cannot be computed from a
+        result (the results are kept).
     RoughviscError
         If no case could be finished. If some cases fail, they are recorded in the folder and logged as warnings. A case
         that needs more memory than its worker has is refused and not recorded, because it may fit elsewhere.
@@ -185,8 +187,7 @@ def run_cases(
     """
     if workers is not None and (client is not None or workers < 0):
         raise InputError(key="workers", found=workers, expected="0 or more, and none together with a client")
-    if client is not None and client.asynchronous:
-        raise InputError(key="client", found=client, expected="a Client(asynchronous=False)")
+    require_synchronous(client)
     distinct, folder = {case.key: case for case in cases}, folder.absolute()
     require_writable(folder, "for the results")
     folder.mkdir(parents=True, exist_ok=True)
@@ -383,11 +384,12 @@ def observe(
     Raises
     ------
     InputError
-        If a quantity cannot be computed from a result; its file is not changed.
+        If a quantity cannot be computed from a result; its file is not changed. If the default client is asynchronous.
     """
     cases = cases_given(cases)
     distinct = {case.key: case for case in cases if case.observed}
     folder = result_folder(cases[0], out).absolute()
+    require_synchronous(default_client())
     added = []
     for number, case in enumerate(distinct.values()):
         if progress is not None:

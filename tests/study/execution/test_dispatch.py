@@ -1,5 +1,6 @@
 """Cases on a cluster: whatever becomes of its workers, every case ends with the same numbers."""
 
+import asyncio
 import os
 import signal
 import subprocess
@@ -139,6 +140,27 @@ def test_default_client__computes_sweeps_but_not_within_a_task(study, tmp_path):
         stored = [key for _, events in client.get_events().items() for _, event in events if (key := key_of(event))]
     assert found.sizes["case"] == 1
     assert set(stored) == {cases[0].key}, "the worker has reported it"
+
+
+def test_asynchronous_client__is_refused_before_anything_runs(study, tmp_path):
+    """Given, or as the default client, as a notebook may have it."""
+    (tmp_path / "out").mkdir()
+    cases, out = study(BALL), tmp_path / "out"
+    calls = (partial(rv.sweep, cases), partial(rv.budget, cases[0]), partial(rv.observe, cases))
+
+    async def main():
+        settings = {"processes": False, "n_workers": 1, "dashboard_address": "127.0.0.1:0", "set_as_default": False}
+        async with Client(asynchronous=True, **settings) as client:
+            for call in calls[:2]:
+                with refused("client", client):
+                    call(out=out, client=client)
+            with client.as_current():
+                for call in (calls[0], calls[2]):
+                    with refused("client", client):
+                        call(out=out)
+
+    asyncio.run(main())
+    assert not list(out.iterdir())
 
 
 def key_of(event):
