@@ -72,3 +72,8 @@ def test_no_contact_and_full_contact(boundary):
     assert (found.isel(time=0).to_array() == 0).all()
     square = math.pi * 0.36678742 * 8e-6 if boundary == "free" else math.inf
     assert float(found["thermal_conductance"][1]) == pytest.approx(square, rel=2e-3)
+    if boundary == "free":  # the outline of a punch is known where its surface is absent
+        around = {axis: (np.arange(-2, 10) + 0.5) * 1e-6 for axis in "xy"}
+        punch = ds.assign(height=(("x", "y"), np.zeros((8, 8)))).reindex(around, method="nearest", tolerance=1e-9)
+        punch = punch.assign(pressure=punch.pressure.fillna(0.0))
+        assert float(conductance(punch, (1.0, 1.0))["thermal_conductance"][1]) == pytest.approx(square, rel=2e-3)

@@ -187,14 +187,16 @@ def test_maps__of_the_flux_show_the_largest_one():
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_section__surfaces_touch_where_pressure_is(axis):
     ds = made.hertz_creep()
-    top, bottom = plot.section(ds, axis=axis).axes
-    profile, surface, contact = bottom.lines[:3]
-    last = ds.isel(time=-1, **{"x": {"y": 21}, "y": {"x": 30}}[axis])
-    np.testing.assert_allclose(profile.get_ydata(), 1e6 * last["height"])
-    np.testing.assert_allclose(surface.get_ydata(), 1e6 * (last["height"] + last["gap"]), atol=1e-9)
-    assert np.array_equal(np.isfinite(contact.get_ydata()), last["pressure"] > 0)
-    np.testing.assert_allclose(top.patches[0].get_data().values, 1e-3 * last["pressure"])
-    assert (top.get_ylabel(), bottom.get_ylabel()) == ("Pressure [kPa]", "Height [µm]")
+    across, middle = {"x": ("y", 21), "y": ("x", 30)}[axis]
+    for index, at in ((middle, None), (middle - 2, float(ds[across][middle - 2]))):
+        top, bottom = plot.section(ds, axis=axis, at=at).axes
+        profile, surface, contact = bottom.lines[:3]
+        last = ds.isel({"time": -1, across: index})
+        np.testing.assert_allclose(profile.get_ydata(), 1e6 * last["height"])
+        np.testing.assert_allclose(surface.get_ydata(), 1e6 * (last["height"] + last["gap"]), atol=1e-9)
+        assert np.array_equal(np.isfinite(contact.get_ydata()), last["pressure"] > 0)
+        np.testing.assert_allclose(top.patches[0].get_data().values, 1e-3 * last["pressure"])
+        assert (top.get_ylabel(), bottom.get_ylabel()) == ("Pressure [kPa]", "Height [µm]")
 
 
 # ----------------------------------------------------------------------------------------------------- surfaces
