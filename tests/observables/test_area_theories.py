@@ -35,6 +35,14 @@ def test_elastic__both_limits_by_hand():
     assert ratio == pytest.approx(2 / math.pi, rel=1e-3), "sqrt(8/pi) over sqrt(2 pi)"
 
 
+def test_mirror_images__have_the_slope_of_the_surface_without_a_seam():
+    tilted = SURFACE + 0.2 * SURFACE.x
+    ds = loaded([0.0, 1.0], [0.0, 1e4], boundary="mirror").assign(height=tilted)
+    found = area_by_theory(ds, material=rv.elastic(1e6, 0.3))["asperity_contact_area"][1]
+    slope = math.hypot(float(rv.parameters(SURFACE)["Sdq"]), 0.2)
+    assert float(found) == pytest.approx(SIDE**2 * math.sqrt(2 * math.pi) * 1e4 / (2e6 / 0.7) / slope, rel=0.05)
+
+
 def test_creep__replaces_the_compliance():
     times = np.array([0.0, 0.01, 0.1, 1.0])
     found = area_by_theory(loaded(times, np.full(4, 2e4)), material=RUBBER)["persson_contact_area"]

@@ -8,6 +8,7 @@ from samples import QUICK_RUBBER as RUBBER
 from scipy.integrate import cumulative_trapezoid
 from scipy.special import erf
 
+import roughvisc as rv
 from roughvisc.mechanics.body import HALF_SPACE, Body
 from roughvisc.mechanics.materials.series import complex_compliance
 from roughvisc.mechanics.sheet import Sheet
@@ -37,6 +38,19 @@ def test_full_contact__is_exact(shape, body):
     friction, area = friction_of_waves(sliding_on(shape, body=body), height, pressure)
     assert area == 1
     assert friction == pytest.approx(total / pressure, rel=1e-12)
+
+
+def test_direction__is_that_of_the_curve():
+    """Along y on the surface turned by its diagonal."""
+    height = rv.self_affine((SIDE, 8e-4), (12, 9), hurst=0.8, rms_slope=0.1, seed=3)
+    turned = height.rename(x="y", y="x").transpose("x", "y")
+    found = {}
+    for name, surface, direction in (("x", height, "x"), ("y", turned, "y"), ("across", height, "y")):
+        asked = {"pressure": 1e4, "speeds": [SPEED], "direction": direction, "progress": False}
+        ds = rv.friction(surface, RUBBER, tolerance=0.1, **asked)
+        found[name] = float(rv.observables.persson(ds, RUBBER).persson_friction_coefficient[0])
+    assert found["y"] == pytest.approx(found["x"], rel=1e-9)
+    assert found["across"] != pytest.approx(found["x"], rel=0.01)
 
 
 def test_waves_of_one_length__have_half_of_their_variance_behind_them():
