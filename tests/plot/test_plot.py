@@ -168,6 +168,8 @@ def test_maps__of_many_cells_keep_the_extremes_of_every_block(monkeypatch):
             [reduction(one[np.isfinite(one)]) if (i, j) != (0, 0) else np.nan for (i, j), one in blocks.items()]
         )
         np.testing.assert_allclose(drawn.ravel() / np.nanmax(drawn), expected / np.nanmax(expected), rtol=1e-12)
+        sides = [4e3 * count * float(ds[axis][1] - ds[axis][0]) for axis, count in (("x", 13), ("y", 10))]
+        np.testing.assert_allclose(image.get_extent(), [0, sides[0], 0, sides[1]], atol=1e-9)
 
 
 def test_maps__of_the_flux_show_the_largest_one():
