@@ -63,14 +63,16 @@ def test_interval__holds_hertz(tmp_path):
 @pytest.mark.parametrize(("quantity", "power"), [("contact_area", 2 / 3), ("approach", 2 / 3), ("force", 0.0)])
 def test_modulus__of_a_hertz_contact(tmp_path, quantity, power):
     """Area and approach under a load go with the modulus to the power -2/3; an area is counted in cells."""
-    fine = case(BALL, tmp_path, **{"surface.shape": [131, 131]})
+    halved = {"material.shear_modulus": "2 MPa", "material.modulus_factor": 0.5}
+    fine = case(BALL, tmp_path, **{"surface.shape": [131, 131]}, **halved)
     found = stated(fine, tmp_path, quantity, modulus_error=0.05)
     assert width(found, "modulus") == pytest.approx(power * np.log(1.05), rel=0.1, abs=1e-9)
 
 
 def test_time_scale__of_a_fluid_under_a_ball(tmp_path):
     """a^3 goes with J = 1/G + t/eta: its logarithm changes with that of the times by -(t/eta) / J."""
-    changes = {"material": {"model": "maxwell", "shear_modulus": "1 MPa", "viscosity": "1 MPa s"}}
+    fluid = {"model": "maxwell", "shear_modulus": "1 MPa", "viscosity": "10 MPa s", "shift_factor": 0.1}
+    changes = {"material": fluid}
     study = case(BALL, tmp_path, **changes, **{"program.0.load": "0.05 mN"})
     found = stated(study, tmp_path, "approach", time_scale_error=0.05)
     assert width(found, "time scale", 0) == pytest.approx(0.0, abs=1e-6)
