@@ -203,12 +203,14 @@ def test_budget__refuses(tmp_path, options, key, found):
     assert not (tmp_path / "budget").exists()
 
 
-def test_figure__draws_every_source(tmp_path):
+def test_figure__draws_every_source_to_its_side(tmp_path):
     found = stated(case(BALL, tmp_path), tmp_path, modulus_error=0.3)
+    found["half_width"][:, -1] = [0.1, 0.2, 0.3]
+    found["direction"][:, -1] = [1, -1, 0]
     (bars,) = rv.plot.budget(found).axes
-    counted = (found["half_width"].isel(time=-1) > 0).sum()
-    assert sum(bar.get_width() > 0 for bar in bars.patches) == int(counted) + 1
-    together = bars.patches[-1].get_bbox()
+    *sources, together = (bar.get_bbox() for bar in bars.patches)
+    ends = [(0.0, 0.1), (-0.2, 0.0), (-0.3, 0.3)]
+    np.testing.assert_allclose([(bar.x0, bar.x1) for bar in sources], 100 * np.expm1(ends), atol=1e-9)
     for end, edge in (("lower", together.x0), ("upper", together.x1)):
         assert edge == pytest.approx(100 * (float(found[end][-1] / found["value"][-1]) - 1), rel=1e-9)
     for wrong in (xr.Dataset(), found.expand_dims("quantity")):
