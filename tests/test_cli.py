@@ -57,11 +57,13 @@ def test_run__writes_result_and_figures_and_sums_up(invoke, tmp_path, coarse_pic
 
 def test_run__sweep_with_a_case_that_fails_is_status_1_and_tried_again(invoke, tmp_path):
     sweep = '[sweep]\n"program.0.load" = ["5 mN", "50 N", "6 mN"]'
-    status, out, err = invoke("run", write_study(BALL + sweep), "--workers", 0)
+    status, out, err = invoke("run", write_study(BALL + sweep), "--workers", 0, "--device", "cpu")
     folder = tmp_path / "results" / "ball"
     (record,) = folder.glob("*.failed.json")
     assert (status, len(list(folder.glob("*.nc"))), "case 1" in err) == (1, 2, True)
     assert "Results: results/ball\nTable of cases: results/ball/cases.csv\nLog: results/ball/sweep.log\n" in out
+    settings = [name for name in rv.to_table(folder) if name.startswith(("program.", "solve."))]
+    assert settings == ["program.0.load [N]"], "an option is no setting that the study varies"
     before = record.stat().st_mtime_ns
     assert invoke("run", "ball.toml", "--workers", 0, "-q")[:2] == (1, "")
     assert record.stat().st_mtime_ns > before, "a failed case is tried again"
@@ -163,7 +165,7 @@ def test_scan__replaces_its_own_picture_and_keeps_any_other(name, invoke, tmp_pa
 
 
 def test_new__writes_a_study_that_runs_and_brings_some_per_cent_into_contact(invoke, tmp_path, scan_file):
-    status, out, err = invoke("new", scan_file)
+    status, out, err = invoke("new", scan_file, "--contact", "10 %")
     assert (status, err) == (0, "")
     assert "Study: tilted-study.toml\nNext: roughvisc plan tilted-study.toml\n" in out
     text = (tmp_path / "tilted-study.toml").read_text()
@@ -176,7 +178,7 @@ def test_new__writes_a_study_that_runs_and_brings_some_per_cent_into_contact(inv
     assert invoke("run", "tilted-study.toml", "--no-plots", "-q") == (0, "", "")
     (result,) = (tmp_path / "results" / "tilted-study").glob("*.nc")
     with xr.open_dataset(result) as ds:
-        assert float(ds.contact_fraction[-1]) == pytest.approx(0.05, rel=0.05)
+        assert float(ds.contact_fraction[-1]) == pytest.approx(0.1, rel=0.05)
         assert float(ds.contact_fraction[0]) < float(ds.contact_fraction[-1])
 
 
@@ -196,6 +198,7 @@ def test_new__prints_commands_that_run_for_any_name(invoke, tmp_path, scan_file)
     _, out, _ = invoke("new", "./-5 it's $PWD.nc")
     printed = [line.partition("roughvisc ")[2] for line in out.splitlines() if "roughvisc plan" in line]
     study = tmp_path / "-5 it's $PWD-study.toml"
+    assert "brings about 5 % of the area into contact" in study.read_text(), "by default"
     printed += [line.partition("roughvisc ")[2].partition("   ")[0] for line in study.read_text().splitlines()[1:3]]
     assert [shlex.split(line)[0] for line in printed] == ["plan", "plan", "run"]
     for line in printed:
