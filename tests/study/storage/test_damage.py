@@ -15,7 +15,7 @@ import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.study.case import read_cases, read_study
 from roughvisc.study.execution.run import run_case
-from roughvisc.study.storage.netcdf import DamagedError, verify
+from roughvisc.study.storage.netcdf import DamagedError, verify, write_result
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]")
 TWO_LOADS = SMALL + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'
@@ -39,12 +39,13 @@ def copied(sample, tmp_path):
     return tmp_path / "ball.toml", case, Path(shutil.copy(original, tmp_path / "out"))
 
 
-def with_flipped_bit(path, name, place=0):
-    """Flip one bit of a stored block of a variable."""
+def with_flipped_bit(path, name, number=0):
+    """Flip one bit of a stored block of a variable, the first one by default."""
     with h5py.File(path) as file:
-        block = file[name].id.get_chunk_info(0)
+        stored = file[name].id
+        block = stored.get_chunk_info(number % stored.get_num_chunks())
     content = bytearray(path.read_bytes())
-    content[block.byte_offset + block.size // 2 + place] ^= 4
+    content[block.byte_offset + block.size // 2] ^= 4
     path.write_bytes(content)
 
 
@@ -187,11 +188,13 @@ def test_sweep__names_it_and_leaves_it(copied, change, invoke):
 
 def test_verify__names_what_is_damaged_and_changes_nothing(copied, sample, invoke):
     _, _, path = copied
-    for name in "ab":
-        shutil.copy(path, path.with_name(f"{name}.nc"))
+    shutil.copy(path, path.with_name("a.nc"))
+    with rv.open_result(path) as ds:  # many blocks of rows, of which the last one is damaged
+        rows = xr.concat([ds] * 14, "time", data_vars="minimal").assign_coords(time=np.arange(14.0 * ds.sizes["time"]))
+        write_result(rows, path.with_name("b.nc"))
     path.unlink()
     out = path.parent
-    with_flipped_bit(out / "b.nc", "pressure")
+    with_flipped_bit(out / "b.nc", "pressure", -1)
     assert {one.name: bool(flaw) for one, flaw in verify(out).items()} == {"a.nc": False, "b.nc": True}
     content = (out / "b.nc").read_bytes()
     status, said, err = invoke("verify", out)
