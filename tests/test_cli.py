@@ -198,7 +198,7 @@ def test_new__prints_commands_that_run_for_any_name(invoke, tmp_path, scan_file)
     _, out, _ = invoke("new", "./-5 it's $PWD.nc")
     printed = [line.partition("roughvisc ")[2] for line in out.splitlines() if "roughvisc plan" in line]
     study = tmp_path / "-5 it's $PWD-study.toml"
-    assert "brings about 5 % of the area into contact" in study.read_text(), "by default"
+    assert '(roughvisc new --contact "5 %")' in study.read_text(), "by default"
     printed += [line.partition("roughvisc ")[2].partition("   ")[0] for line in study.read_text().splitlines()[1:3]]
     assert [shlex.split(line)[0] for line in printed] == ["plan", "plan", "run"]
     for line in printed:

@@ -123,7 +123,7 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
     of_force = series_error * loaded
     unit = scene.tolerance if largest_force > 0 else 0.0
     solved = point.solver_error + INHERITED * state.solver_error if remembers else max(point.solver_error, LEAST * unit)
-    work = abs(state.work_apart) + state.work_curved
+    work = abs(state.work_apart) + state.work_curved + state.work_relaxed
     work += (OF_WORK * solved + series_error) * loaded * reached
     force = approach = 0.0
     if control == "approach" or not given:

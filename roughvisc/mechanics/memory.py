@@ -266,6 +266,10 @@ class Memory:
         second = np.where(flows, t[..., None] ** 3 / 6, second)
         return self.glassy * t + first @ self.compliances, self.glassy * t**2 / 2 + second @ self.compliances
 
+    def relaxation(self, time: float) -> float:
+        """Return the relaxation function over its first value, see :meth:`relaxed`."""
+        return 1.0 - float((self.relaxing * -np.expm1(-self.rates * time)).sum())
+
     def relaxed(self, time: ArrayLike) -> tuple[Any, Any]:
         """Return the integral of the relaxation function over its first value, and its integral. [s, s2]
 

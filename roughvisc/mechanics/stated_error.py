@@ -21,7 +21,7 @@ import numpy as np
 from roughvisc.mechanics.grid import fft_of
 from roughvisc.mechanics.memory import STIFF
 from roughvisc.mechanics.program import Slide
-from roughvisc.mechanics.scene import SOFT, Array, Point, Scene
+from roughvisc.mechanics.scene import SOFT, Point, Scene
 from roughvisc.mechanics.tangential import tangential_force
 
 #: Stated error over the difference between the fine and the coarse solution, of pressure and force,
@@ -82,7 +82,7 @@ class Difference:
             pressure=max(self.pressure, part * before.pressure),
             force=max(self.force, part * before.force),
             approach=max(self.approach, LASTING * before.approach),
-            friction=max(self.friction, part * before.friction),
+            friction=max(self.friction, left * before.friction),  # both solutions may share all of it
         )
 
     def or_larger(self, other: Difference, part: float = 1.0) -> Difference:
@@ -195,7 +195,7 @@ def phase_error(scene: Scene, point: Point, slide: Slide, step: float) -> float:
 
 
 def work_of_pair(
-    scene: Scene, start: Point, first: Point, end: Point, inside: list[Point], begins_at_corner: bool
+    scene: Scene, start: Point, first: Point, end: Point, inside: list[Point]
 ) -> tuple[list[float], float, float]:
     """Return the work of the normal force from the start of a pair to points inside it and to its end. [J]
 
@@ -211,8 +211,6 @@ def work_of_pair(
         Fine solution before the pair, after its first step and at its end.
     inside : list of Point
         Points within the pair, in order, `first` among them.
-    begins_at_corner : bool
-        Whether the pair is the first one after a corner of the program.
 
     Returns
     -------
@@ -244,46 +242,57 @@ def work_of_pair(
         return works, uncertain * abs(straight[0]), uncertain * abs(straight[1])
     force = np.polynomial.Polynomial([begin[0], slopes[0], bends[0]])
     rate = np.polynomial.Polynomial([slopes[1], 2 * bends[1]])
-    work = (force * rate).integ()
-    works = [float(work(parameter(point))) for point in points]
-    errors = [abs(line - float(work(at))) for line, at in zip(straight, (early, last), strict=True)]
-    if begins_at_corner and is_over_time and not start.is_late:
-        errors[1] += transient_error(scene, begin, changes, early, last)
+    integral = (force * rate).integ()
+    curved = [float(integral(at)) for at in (early, last)]
+    arches = curved[0] - straight[0], curved[1] - curved[0] - straight[1] + straight[0]
+    works = []
+    for point in inside:  # the straight line to the point itself, and its part of the arch above the step
+        ends, known, arch = (start, first), 0.0, arches[0]
+        if point.time > first.time:
+            ends, known, arch = (first, end), curved[0], arches[1]
+        part = (point.time - ends[0].time) / (ends[1].time - ends[0].time)
+        works.append(known + work_of_step(scene, ends[0], point) + part**3 * arch)
+    works.append(curved[1])
+    errors = [abs(line - work) for line, work in zip(straight, curved, strict=True)]
     return works, errors[0], errors[1]
 
 
-def transient_error(scene: Scene, begin: Array, changes: Array, early: float, last: float) -> float:
-    """Return the error of the work of a pair after a corner, due to a force or approach that relaxes within a step. [J]
+def transient_error(scene: Scene, start: Point, first: Point, end: Point, *, by_load: bool) -> float:
+    """Return the error of the work of a pair after a corner, due to a transient that is over within a step. [J]
 
-    At a corner the rate of the prescribed quantity changes. The other one then follows the integral of the relaxation
-    or creep function, ``S(t)``, to which a smooth change adds. ``begin + a t + b S(t)`` through the three points of a
-    pair has another integral than the parabola.
+    At a corner the rate of the prescribed quantity changes. A force that relaxes within the first step then has an
+    error of the size of the relaxed part ``1 - h R(h) / S(h)`` of its change, with the relaxation function ``R`` and
+    its integral ``S``, twice as much if the rate changes its sign. It remains to the end of the pair. Under a given
+    load the approach is right at both points, and follows the integral of the compliance, ``S``, between them. ``begin
+    + a t + b S(t)`` through the three points of a pair has another integral than the parabola.
 
     Parameters
     ----------
     scene : Scene
         Input of the time stepping.
-    begin : array, shape (2,)
-        Force and approach at the corner. [N, m]
-    changes : array, shape (2, 2)
-        Changes of force and approach to the end of each step.
-    early, last : float
-        Ends of both steps, from the corner. [s]
+    start, first, end : Point
+        Fine solution at the corner, and after each step.
+    by_load : bool
+        Whether the load is prescribed.
     """
-    error, times = 0.0, np.array([early, last])
-    for quantity, followed in ((0, scene.memory.relaxed), (1, scene.memory.crept)):
-        integral, twice = followed(times)
-        determinant = early * integral[1] - last * integral[0]
-        if abs(determinant) <= 1e-9 * last * abs(integral[1]):
-            continue
-        change = changes[:, quantity]
-        weight = (early * change[1] - last * change[0]) / determinant
-        slope = (change[0] - weight * integral[0]) / early
-        modal = slope * last**2 / 2 + weight * twice[1]
-        bend = (change[1] / last - change[0] / early) / (last - early)
-        smooth = (change[0] / early - bend * early) * last**2 / 2 + bend * last**3 / 3
-        error = max(error, float(abs((modal - smooth) * changes[1, 1 - quantity]) / last))
-    return error
+    if first.is_open or end.is_open:
+        return 0.0
+    early, last = first.time - start.time, end.time - start.time
+    if not by_load:
+        relaxed = 1 - early * scene.memory.relaxation(early) / float(scene.memory.relaxed(early)[0])
+        return 2 * relaxed * abs(first.force - start.force) * abs(end.approach - touch(scene, start))
+    integral, twice = scene.memory.crept([early, last])
+    determinant = early * integral[1] - last * integral[0]
+    if abs(determinant) <= 1e-9 * last * abs(integral[1]):
+        return 0.0
+    begin = touch(scene, start)
+    changes = first.approach - begin, end.approach - begin
+    weight = (early * changes[1] - last * changes[0]) / determinant
+    slope = (changes[0] - weight * integral[0]) / early
+    modal = slope * last**2 / 2 + weight * twice[1]
+    bend = (changes[1] / last - changes[0] / early) / (last - early)
+    smooth = (changes[0] / early - bend * early) * last**2 / 2 + bend * last**3 / 3
+    return float(abs((modal - smooth) * (end.force - start.force)) / last)
 
 
 def work_of_step(scene: Scene, before: Point, after: Point, slides: bool = False) -> float:

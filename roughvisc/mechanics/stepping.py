@@ -28,6 +28,7 @@ from roughvisc.mechanics.memory import STIFF, Rule
 from roughvisc.mechanics.program import Segment, Slide, instant
 from roughvisc.mechanics.scene import SOFT, Array, Packed, Point, Scene
 from roughvisc.mechanics.stated_error import (
+    LASTING,
     OF_ONE_CELL,
     Difference,
     difference,
@@ -36,6 +37,7 @@ from roughvisc.mechanics.stated_error import (
     friction,
     phase_error,
     touch,
+    transient_error,
     work_of_pair,
     work_of_step,
 )
@@ -98,6 +100,8 @@ class State:
         Work of the coarse solution less the work of the fine one, both along straight paths. [J]
     work_curved : float
         Error of the quadrature of the work: root of the sum of the squares of all pairs. [J]
+    work_relaxed : float
+        Error of the work due to forces that relax within the first step after a corner: sum over all corners. [J]
     distance : float
         Length of the path of the slides so far. [m]
     convolutions : int
@@ -117,6 +121,7 @@ class State:
     work: float = 0.0
     work_apart: float = 0.0
     work_curved: float = 0.0
+    work_relaxed: float = 0.0
     distance: float = 0.0
     convolutions: int = 0
 
@@ -288,7 +293,8 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         parts = max(math.ceil((event - fine.time) / (scene.time_step or longest) * (1 - ROUNDED)), 1)
         return [single_step(scene, state, fine.time + (event - fine.time) / parts if parts > 1 else event)]
 
-    jumped = number > 0 and scene.program.segments[number - 1].duration == 0 and not fine.is_open
+    former = scene.program.segments[number - 1] if number > 0 else segment
+    jumped = (former.duration == 0 or former.slide is not None) and not fine.is_open
     length = state.length or first_length(scene, segment, jumped)
     if segment.amplitude:
         length = min(length, segment.period / PAIRS_OF_A_CYCLE)
@@ -363,7 +369,10 @@ def accepted(
             inside.append(row_inside(scene, pair, time, number))
     inside.sort(key=lambda point: point.time)
     is_first = fine.time == scene.program.corners[number]
-    works, work_error, last_error = work_of_pair(scene, fine, pair.first, pair.second, inside, is_first)
+    works, work_error, last_error = work_of_pair(scene, fine, pair.first, pair.second, inside)
+    by_load, relaxing = scene.program.segments[number].control == "load", 0.0
+    if is_first and not fine.is_late:
+        relaxing = transient_error(scene, fine, pair.first, pair.second, by_load=by_load)
     after = after_steps(
         scene,
         state,
@@ -373,6 +382,7 @@ def accepted(
         difference=error,
         work=state.work + works[-1],
         work_curved=math.hypot(state.work_curved, last_error),
+        work_relaxed=state.work_relaxed + relaxing,
     )
 
     steps, apart = [], max(state.work_apart, after.work_apart, key=abs)
@@ -381,7 +391,9 @@ def accepted(
         shared = entering(scene, fine, point) + state.difference.shared * memory.remaining(point.time - fine.time)
         between = replace(error.or_larger(state.difference, left), shared=shared)
         curved = math.hypot(state.work_curved, work_error if point.time <= pair.first.time else last_error)
-        within = replace(state, work=state.work + work, work_curved=curved, work_apart=apart)
+        within = replace(
+            state, work=state.work + work, work_curved=curved, work_apart=apart, work_relaxed=after.work_relaxed
+        )
         steps.append(Step(point, between, number, within, is_end=False))
     return [*steps, Step(at_end, error, number, after)]
 
@@ -503,7 +515,8 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
         error = replace(error, friction=abs(friction(scene, last, slide)))
     error = error.at_least(state.difference, relaxed)
     phase = phase_error(scene, last, slide, points[1].time - fine.time)
-    error = replace(error, shared=shared, friction=max(error.friction, phase))
+    of_friction = max(error.friction, phase, LASTING * state.difference.friction)  # each step makes a new error
+    error = replace(error, shared=shared, friction=of_friction)
     work, distance = state.work + works[-1], state.distance + count * side
     after = after_steps(scene, state, points[1:], once, difference=error, work=work, distance=distance)
     apart = max(state.work_apart, after.work_apart, key=abs)

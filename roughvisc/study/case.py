@@ -281,14 +281,14 @@ def case_given(case: Any) -> Case:
     if isinstance(case, Case):
         return case
     if isinstance(case, str | PathLike):
-        return read_study(Path(case))
+        return read_study(case)
     raise InputError(key="case", found=case, expected="a Case, such as rv.read_study(...), or the path of a study file")
 
 
 def cases_given(cases: Any) -> Sequence[Case]:
     """Return a list of cases, or the cases of the study file at a path; refuse anything else."""
     if isinstance(cases, str | PathLike):
-        return read_cases(Path(cases))
+        return read_cases(cases)
     if not isinstance(cases, Sequence) or not cases:
         expected = "a list of at least one case, such as rv.read_cases(...), or the path of a study file"
         raise InputError(key="cases", found=cases, expected=expected)

@@ -17,10 +17,10 @@ SURFACE = rv.self_affine(SIDE, (24, 20), hurst=0.8, rms_slope=0.1, rolloff=SIDE 
 SLOPE = float(rv.parameters(SURFACE, periodic=True)["Sdq"])
 
 
-def loaded(times, pressures, material=RUBBER):
+def loaded(times, pressures, material=RUBBER, boundary="periodic"):
     """A result under a nominal pressure that is piecewise linear, with a jump at its start."""
     program = rv.Program.table(times, pressures, control="pressure")
-    how = {"boundary": "periodic", "tolerance": 0.1, "fields": (), "progress": False}
+    how = {"boundary": boundary, "tolerance": 0.1, "fields": (), "progress": False}
     return rv.simulate(SURFACE, material, program, times=times, **how)
 
 
