@@ -30,8 +30,13 @@ Array = NDArray[np.float64]
 INHERITED, INHERITED_APPROACH = 0.25, 0.06
 #: Least stated error of the pressure of an elastic body, over the tolerance. Measured on the same rows.
 LEAST = 0.015
-#: Error of the work due to the contact solver, over its error of the pressure times the largest force and approach.
-OF_WORK = 0.2
+#: Error of the work of an elastic body due to the contact solver, over its error of the pressure times the largest
+#: force and approach. An error ``dp`` of the pressure changes the stored energy by the integral of ``u dp``, and the
+#: displacement ``u`` of a contact cell lies between zero and the approach. Under a given load the integral of ``dp``
+#: vanishes, so ``u`` may count from half the approach.
+OF_WORK = {"approach": 1.0, "load": 0.5}
+#: The same of a body with memory, whose work is an integral over steps with independent errors.
+OF_WORK_OF_STEPS = 0.2
 #: Error of the pressure at the edge of contact, over the mean error of the pressure.
 SOLVER_AT_EDGE = 3.0
 #: Unrecovered part of the creep after a period from which a result warns. Measured error of the friction of a sphere on
@@ -124,7 +129,8 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
     unit = scene.tolerance if largest_force > 0 else 0.0
     solved = point.solver_error + INHERITED * state.solver_error if remembers else max(point.solver_error, LEAST * unit)
     work = abs(state.work_apart) + state.work_curved + state.work_relaxed
-    work += (OF_WORK * solved + series_error) * loaded * reached
+    of_work = OF_WORK_OF_STEPS if remembers else OF_WORK["load" if control == "load" else "approach"]
+    work += (of_work * solved + series_error) * loaded * reached
     force = approach = 0.0
     if control == "approach" or not given:
         force = apart.force + solved * point.force + of_force
