@@ -5,7 +5,8 @@ difference, times a factor, as the error at the end of the pair. Both solutions 
 
 - the difference has parts of first and of second order and may pass through zero (:meth:`Difference.at_least`);
 - the pressure of a cell that has just entered the contact is uncertain (:func:`entering`, :func:`entered_early`);
-- slow slides of soft bodies have the phase error of BDF2 at one and at two cells a step (:func:`phase_error`).
+- slow slides of soft bodies have the phase error of BDF2 at one and at two cells a step (:func:`phase_error`);
+- their first step misses the friction (:func:`skipped_friction`).
 
 The work of a pair is an integral over parabolas (:func:`work_of_pair`). Its error is the difference to straight lines,
 and after a corner of the program the part of the force that relaxes within a step.
@@ -189,6 +190,33 @@ def phase_error(scene: Scene, point: Point, slide: Slide, step: float) -> float:
     friction_of_wave = 2 / count * power * phase / scene.grid.spacing[axis] * scene.grid.cell_area
     off = scene.grid.xp.sin(phase) * (2 - scene.grid.xp.cos(phase)) / phase - 1
     return float(abs(friction_of_wave * off).sum())
+
+
+def skipped_friction(scene: Scene, before: Point, point: Point, slide: Slide, step: float) -> float:
+    """Return the friction force that the first step of a slow slide misses. [N]
+
+    The step takes the pressure as constant, so slow waves have hardly any friction at its end. A pressure that is
+    linear within the step would change the displacement by the change of pressure times the compliance at the end of
+    the step less its mean over the step.
+
+    Parameters
+    ----------
+    scene : Scene
+        Input of the time stepping.
+    before, point : Point
+        Solution before the step, in the frame of its end, and at its end.
+    slide : Slide
+        Motion.
+    step : float
+        Length of the step. [s]
+    """
+    memory = scene.memory
+    follows = before.history.earlier is not None
+    if follows or not (memory.may_ring and memory.grows(step, STIFF)) or point.is_open:
+        return 0.0
+    missed = memory.compliance(step) - float(memory.crept(step)[0]) / step
+    change = missed * (point.history.fields[0] - before.history.fields[0])
+    return abs(tangential_force(scene.grid, point.pressure, change, slide))
 
 
 # -------------------------------------------------------------------------------------------------------------- work

@@ -36,6 +36,7 @@ from roughvisc.mechanics.stated_error import (
     entering,
     friction,
     phase_error,
+    skipped_friction,
     touch,
     transient_error,
     work_of_pair,
@@ -487,10 +488,12 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     def moved(pressure: Array, number: int) -> Array:
         return grid.xp.roll(pressure, -slide.sense * number, slide.axis)
 
-    def over(here: Point, number: int, time: float, guess: Guess) -> Point:
+    def body_under(here: Point, number: int) -> Point:
         history = memory.roll(here.history, slide.sense * number, slide.axis)
-        body = replace(here, history=history, stored_pressure=moved(here.pressure, number), before=None)
-        return take_step(scene, body, time, state.segment, guess=guess, share=SLIDING_SHARE)
+        return replace(here, history=history, stored_pressure=moved(here.pressure, number), before=None)
+
+    def over(here: Point, number: int, time: float, guess: Guess) -> Point:
+        return take_step(scene, body_under(here, number), time, state.segment, guess=guess, share=SLIDING_SHARE)
 
     points, works = [fine], [0.0]
     for number in range(1, count + 1):
@@ -514,15 +517,22 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     if cells == 1 and not memory.is_elastic:  # there is no solution with longer steps
         error = replace(error, friction=abs(friction(scene, last, slide)))
     error = error.at_least(state.difference, relaxed)
-    phase = phase_error(scene, last, slide, points[1].time - fine.time)
-    of_friction = max(error.friction, phase, LASTING * state.difference.friction)  # each step makes a new error
+    step, skipped = points[1].time - fine.time, 0.0
+    if taken == 0 and not memory.is_elastic:  # a long first step is of first order, and the next one corrects it
+        change = abs(friction(scene, points[1], slide) - friction(scene, last, slide))
+        skipped = skipped_friction(scene, body_under(fine, 1), points[1], slide, step)
+        skipped = max(skipped, change * (1 - memory.remaining(step)))
+    carried = max(LASTING * state.difference.friction, skipped if count == 1 else skipped * memory.remaining(step))
+    of_friction = max(error.friction, carried, phase_error(scene, last, slide, step))  # each step makes a new error
     error = replace(error, shared=shared, friction=of_friction)
     work, distance = state.work + works[-1], state.distance + count * side
     after = after_steps(scene, state, points[1:], once, difference=error, work=work, distance=distance)
     apart = max(state.work_apart, after.work_apart, key=abs)
     inside = replace(state, work=state.work + works[1], work_apart=apart, distance=state.distance + side)
     ends = Step(last, error, state.segment, after)
-    return [Step(points[1], error.or_larger(state.difference), state.segment, inside, is_end=False), ends][-count:]
+    between = error.or_larger(state.difference)
+    between = replace(between, friction=max(between.friction, skipped))
+    return [Step(points[1], between, state.segment, inside, is_end=False), ends][-count:]
 
 
 # ------------------------------------------------------------------------------------------------------------- steps
