@@ -1,23 +1,32 @@
-"""Cells that enter or leave the contact just before a kept row, of a body with little instantaneous compliance."""
+"""Cells that enter the contact of a body with little instantaneous compliance: true and stated errors of the rows."""
 
 import numpy as np
 import pytest
 from support import relative_errors
 
 import roughvisc as rv
+from roughvisc.version import NUMERICS_REVISION
 
 TOLERANCE = 1e-2
+#: A row misses the tolerance if its error exceeds so many tolerances. It is silent if the error also exceeds so many
+#: times the stated error.
+MARGIN = 1.5
+#: Number of contacts, and the most rows that may miss the tolerance and be silent. Of 2,870 rows of 410 other contacts
+#: 9 missed the tolerance and 5 were silent, at a reference thirty times sharper: 2.2 and 1.2 of 700 rows. At this rate
+#: more rows than these have a probability of 1 in 1,000, whichever contacts a revision draws.
+COUNTS = [(30, 4, 3), pytest.param(100, 8, 6, marks=pytest.mark.thorough)]
 
 
-def drawn(seed):
+def random_contact(rng):
     """Return a wavy surface of 2 x 40 cells, a material, a program and kept times."""
-    rng = np.random.default_rng(seed)
     places = np.arange(40) / 40
     waves = ((number, rng.normal(), rng.random()) for number in range(1, 9))
     height = sum(size * number**-1.3 * np.cos(2 * np.pi * (number * places + phase)) for number, size, phase in waves)
     surface = rv.from_array(np.repeat(0.01 * height[None, :], 2, 0), spacing=1 / 40)
     material = rv.Prony(0.08, 0.0, (0.92,), (10 ** rng.uniform(-1.5, 0.5),))
-    program, full, by_approach = rv.Program(), float(surface.max() - surface.mean()), rng.random() < 0.5
+    program = rv.Program()
+    full = float(surface.max() - surface.mean())
+    by_approach = rng.random() < 0.5
     for number in range(rng.integers(2, 6)):
         over = 10 ** rng.uniform(-1.5, 0.3)
         if rng.random() < 0.25 and number:
@@ -29,35 +38,58 @@ def drawn(seed):
     return surface, material, program, sorted(rng.uniform(0, program.duration, 7))
 
 
-# without what is uncertain of entered cells, each of these has a row beyond the tolerance that states less
+def errors_of_rows(surface, material, program, times, sharper):
+    """Return the true and the stated error of each row over the tolerance, against a run so many times sharper."""
+    settings = {"boundary": "periodic", "fields": ("pressure",), "progress": False}
+    result = rv.simulate(surface, material, program, times=times, tolerance=TOLERANCE, **settings)
+    times = result.time.values.tolist()
+    exact = rv.simulate(surface, material, program, times=times, tolerance=TOLERANCE / sharper, **settings)
+    return relative_errors(result, exact) / TOLERANCE, result.stated_error.values / TOLERANCE
+
+
+@pytest.mark.parametrize(("count", "most", "most_silent"), COUNTS)
+def test_rows_of_random_contacts__seldom_miss_the_tolerance_silently(count, most, most_silent):
+    """The contacts are drawn from the revision of the numbers: other ones for each revision."""
+    contacts = [random_contact(np.random.default_rng([NUMERICS_REVISION, number])) for number in range(count)]
+    true, stated = np.array([errors_of_rows(*contact, sharper=8) for contact in contacts]).swapaxes(0, 1)
+    missed = true > MARGIN
+    silent = missed & (true > MARGIN * stated)
+    assert missed.sum() <= most
+    assert silent.sum() <= most_silent
+
+
+def two_crests(lower):
+    """Return a surface of 2 x 40 cells with two crests, one lower by 0.02 times a part."""
+    places = np.arange(40) / 40
+    height = 0.01 * (np.cos(4 * np.pi * places) + lower * np.cos(2 * np.pi * places))
+    return rv.from_array(np.repeat(height[None, :], 2, 0), spacing=1 / 40)
+
+
+#: Seven rows, none at the start or the end of the program of one second.
+ROWS = ((np.arange(7) + 0.7) / 7).tolist()
+
+
+def errors_after_second_crest(lower, retardation_time, program, times):
+    material = rv.Prony(0.08, 0.0, (0.92,), (retardation_time,))
+    return errors_of_rows(two_crests(lower), material, program, times, sharper=30)
+
+
+def test_second_crest_that_enters_just_before_a_row__states_its_uncertain_pressure():
+    """Both solutions of the pair have about the same pressure on the new cells, and it is wrong."""
+    true, stated = errors_after_second_crest(0.1, 0.1, rv.Program().pressure(0.03, over=1.0), ROWS)
+    assert true.max() > 2
+    assert (stated[true > 1] > 1).all()
+
+
 @pytest.mark.parametrize(
-    "seed",
+    ("lower", "retardation_time", "program", "times"),
     [
-        125,
-        188,
-        *(pytest.param(one, marks=pytest.mark.thorough) for one in (36, 232, 259, 336)),
-        # one of seven rows is off by 2.3 tolerances and states 0.4
-        pytest.param(362, marks=[pytest.mark.thorough, pytest.mark.xfail(strict=True, reason="states too little")]),
+        # the pair in which the crest enters is repeated in halves, because both solutions share an error
+        pytest.param(0.3, 0.1, rv.Program().approach(0.0104, over=1.0), ROWS, id="just_before_a_row"),
+        # each step is a row, and the error lasts for several steps
+        pytest.param(0.1, 1.0, rv.Program().pressure(0.03, over=1.0), None, id="several_rows_before"),
     ],
 )
-def test_rows_after_cells_have_entered__keep_the_tolerance_or_say_so(seed):
-    """Against a run at a thirtieth of the tolerance."""
-    surface, material, program, times = drawn(seed)
-    settings = {"boundary": "periodic", "times": times, "fields": ("pressure",), "progress": False}
-    found, exact = (
-        rv.simulate(surface, material, program, tolerance=one, **settings) for one in (TOLERANCE, TOLERANCE / 30)
-    )
-    missed = relative_errors(found, exact) > TOLERANCE
-    assert (found.stated_error.values[missed] > TOLERANCE).all()
-
-
-# with what both solutions miss stated for the pair alone, each of these has a row beyond the tolerance
-@pytest.mark.parametrize("seed", [31, *(pytest.param(one, marks=pytest.mark.thorough) for one in (10, 24))])
-def test_every_kept_step_after_cells_have_entered__keeps_the_tolerance(seed):
-    """The error of cells that have entered decays with relaxation, over several steps."""
-    surface, material, program, _ = drawn(seed)
-    settings = {"boundary": "periodic", "fields": ("pressure",), "progress": False}
-    found = rv.simulate(surface, material, program, tolerance=TOLERANCE, **settings)
-    times = found.time.values.tolist()
-    exact = rv.simulate(surface, material, program, tolerance=TOLERANCE / 30, times=times, **settings)
-    assert relative_errors(found, exact).max() <= TOLERANCE
+def test_rows_after_a_second_crest_has_entered__keep_the_tolerance(lower, retardation_time, program, times):
+    true, _ = errors_after_second_crest(lower, retardation_time, program, times)
+    assert true.max() <= 1
