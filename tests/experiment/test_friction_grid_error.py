@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import roughvisc as rv
+from roughvisc.version import NUMERICS_REVISION
 
 RUBBER = rv.zener(1e6, 1e6 / 3, 1e6 / 3 * 1e-3)
 SPEEDS = [1e-2, 0.1, 1.0]
@@ -36,12 +37,22 @@ def test_grid_error__bounds_the_true_one_of_a_line_contact(pressure):
         assert (stated > LEAST * true - NOISE).all()
 
 
-@pytest.mark.parametrize(("hurst", "seed", "pressure"), [(0.8, 2, 1e5), (0.8, 3, 5e3), (0.8, 1, 2e4), (0.5, 9, 5e3)])
-def test_grid_error__bounds_the_true_one_of_a_rough_surface(hurst, seed, pressure):
-    fine = rv.self_affine(1e-3, 120, hurst=hurst, rms_slope=0.1, rolloff=5e-4, shortcut=1e-3 / 40 * 8, seed=seed)
-    for stated, true in judged(rv.from_array(fine.values[1::3, 1::3], 1e-3 / 40), fine, pressure):
-        assert (stated > LEAST * true - NOISE).all()
-        assert np.median(stated / true.clip(NOISE)) < MIDDLE
+def test_grid_error__bounds_the_true_one_of_rough_surfaces():
+    """Four surfaces that the revision of the numbers draws, of three speeds and four quantities each.
+
+    Of 828 errors of 69 other surfaces two were stated too low. More than two of 48 have a probability of 3 in 10,000.
+    """
+    stated, true = [], []
+    for number in range(4):
+        rng = np.random.default_rng([NUMERICS_REVISION, number])
+        waves = {"hurst": rng.uniform(0.5, 0.9), "rms_slope": 0.1, "rolloff": 5e-4, "shortcut": 1e-3 / 40 * 8}
+        fine = rv.self_affine(1e-3, 120, **waves, seed=rng)
+        errors = judged(rv.from_array(fine.values[1::3, 1::3], 1e-3 / 40), fine, 10 ** rng.uniform(3.5, 5))
+        stated += [error for error, _ in errors]
+        true += [error for _, error in errors]
+    stated, true = np.array(stated), np.array(true)
+    assert np.sum(stated <= LEAST * true - NOISE) <= 2
+    assert np.median(stated / true.clip(NOISE)) < MIDDLE
 
 
 @pytest.mark.parametrize(("ratio", "pressure", "cells"), [(30, 1414, 64), (200, 5657, 64), (1500, 1000, 128)])
