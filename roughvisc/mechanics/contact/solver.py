@@ -27,6 +27,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,7 +35,7 @@ import numpy as np
 from roughvisc.errors import ConvergenceError
 from roughvisc.mechanics.contact import passes as host
 from roughvisc.mechanics.contact.long_waves import LongWaves
-from roughvisc.mechanics.contact.passes import inner
+from roughvisc.mechanics.contact.passes import Free, Last, inner
 from roughvisc.mechanics.grid import Boundary, Grid, namespace
 
 Array = Any  # an array of NumPy or CuPy, depending on the grid
@@ -144,161 +145,269 @@ def solve_contact(
     ConvergenceError
         If the tolerance is not reached, or if the approach reaches full contact.
     """
-    xp, under_load = grid.xp, load is not None
-    passes: Any = host
-    if hasattr(xp, "RawKernel"):  # CuPy
-        from roughvisc.mechanics.contact import kernels
-
-        passes = kernels
-    present = None if present is None or present.all() else present.reshape(-1)
-    absent = slice(0) if present is None else ~present
+    passes = passes_of(grid.xp)
+    if present is not None:
+        present = None if present.all() else present.reshape(-1)
     if start is None or not (start > 0).any():
         start = start_displacement = None
+    if not overwrite:
+        gap = gap.copy()
+        start = None if start is None else start.copy()
+        start_displacement = None if start_displacement is None else start_displacement.copy()
     if start is None and load is not None and present is None and min(gap.shape) >= COARSE_FROM:
         start = coarse_guess(grid, gap, load)
-    if not overwrite:
-        gap, start = gap.copy(), None if start is None else start.copy()
-        start_displacement = None if start_displacement is None else start_displacement.copy()
+    problem = ScaledProblem.of(grid, gap, load, approach, present)
+    pressure, separation = problem.first_guess(start, start_displacement)
 
-    # Divide pressures and lengths by one pressure, and measure lengths from the lowest point: the load is then one.
-    lowest_gap = float(gap.min() if present is None else gap.reshape(-1)[present].min())
-    overlap = 0.0 if approach is None else approach - lowest_gap
-    unit = load if load is not None else (overlap / grid.largest_eigenvalue if overlap > 0 else 1.0)
-    given = gap.reshape(-1)
-    given -= lowest_gap
-    given /= unit
-    given[absent] = 0
-    level = overlap / unit
-    is_blind = not under_load and not grid.definite  # the energy does not depend on a uniform pressure
-    has_blocks = min(gap.shape) >= BLOCKS_FROM  # the preconditioner may have a second level
-    if is_blind and present is None and float(given.mean()) - level <= NEAREST_TO_FULL * level:
-        raise ConvergenceError("the approach reaches full contact and does not determine the load")
-
-    # First guess: the given one, else uniform, or the overlap of the surfaces.
-    if start is not None:
-        pressure = start.reshape(-1)
-        pressure[pressure < 0] = 0
-        pressure /= unit
-    else:
-        pressure = xp.ones(gap.size) if under_load else xp.maximum(level - given, 0) / grid.largest_eigenvalue
-    pressure[absent] = 0
-    scale = 1 / float(pressure.sum()) if under_load else 1.0
-    pressure *= scale
+    under_load = problem.under_load
     is_extrapolated = start_displacement is not None
-    if start_displacement is not None:
-        separation = start_displacement.reshape(-1)
-        separation *= scale / unit
-        separation += given
-    else:
-        separation = given + grid.displacement(pressure.reshape(gap.shape)).reshape(-1)
-
-    on_grid, cells = passes.Scatter(xp.zeros(gap.shape)), xp.flatnonzero(pressure)
+    has_blocks = min(gap.shape) >= BLOCKS_FROM  # the preconditioner may have a second level
+    on_grid = passes.Scatter(grid.xp.zeros(gap.shape))
+    cells = grid.xp.flatnonzero(pressure)
     touching = cells.size  # number of cells in contact
-    previous: tuple[Array, Array, Array, float] | None = None  # cells, change, response, curvature of the last step
-    requested_size, requested_duality = math.nan, math.nan  # L1 norm of the last requested change, duality gap then
-    length, error, best, stalled = 1.0, math.inf, math.inf, 0
+    previous: Last | None = None
+    requested_size = requested_duality = math.nan  # L1 norm of the last requested change, duality gap then
+    length = 1.0
+    error = best = math.inf
+    stalled = 0
     for iteration in range(max_iterations + 1):
         # The gap is closed under a given approach: the energy decreases if all cells carry less.
-        if is_blind and touching == gap.size:
+        if problem.is_blind and touching == gap.size:
             pressure -= pressure.min()
             previous = None
 
         # Approach of the present contact, equation (7) of the paper, and the cells that may change, (14).
-        found = passes.measure(pressure, separation, given.reshape(gap.shape), cells, level, under_load, present)
-        cells, held, residual, level, touching, size, total, *_ = found
-        lowest, highest = min(found.least, level), max(found.most, -found.least, 0.0)
-        if under_load:
-            duality = max(found.weighted - lowest * total, 0.0)
-        else:
-            duality = abs(found.weighted - level * total) + total * (level - lowest)
-        rounding = ROUNDING * total * (highest + grid.self_influence * found.highest_pressure)
-
-        if size == 0 and is_extrapolated:  # a single cell: no step would correct the given displacement
-            separation = given + grid.displacement(pressure.reshape(gap.shape)).reshape(-1)
+        free = passes.measure(
+            pressure, separation, problem.gap.reshape(gap.shape), cells, problem.level, under_load, present
+        )
+        cells = free.cells
+        touching = free.touching
+        duality = duality_gap(free, under_load)
+        rounding = duality_rounding(grid, free)
+        if free.size == 0 and is_extrapolated:  # a single cell: no step would correct the given displacement
+            separation = problem.separation_under(pressure)
             is_extrapolated = False
             continue
 
         # The error estimate is the last requested change of pressure, scaled by the decrease of the duality gap since.
-        if size == 0:
+        if free.size == 0:
             error = 0.0
         elif iteration:
-            error = requested_size * math.sqrt(duality / requested_duality) / max(total, 1e-300)
-        is_empty = size > 0 and total == 0  # a step has emptied all cells although the surfaces overlap
-        is_solved = (
-            error <= tolerance and duality <= max(GAP_SLACK * tolerance * found.energy, rounding) and not is_empty
-        )
-        if is_solved and is_blind and 4 * touching > gap.size:
-            error += load_error(grid, separation.reshape(gap.shape), xp.flatnonzero(pressure), level, present, total)
-            is_solved = error <= tolerance
-        if is_solved:
-            break
+            error = requested_size * math.sqrt(duality / requested_duality) / max(free.total, 1e-300)
+        if is_solved(free, error, tolerance, duality, rounding):
+            error += load_error(problem, pressure, separation, free)
+            if error <= tolerance:
+                break
         if iteration == max_iterations:
             raise ConvergenceError(unsolved(iteration, error, tolerance))
-        best, stalled = (duality, 0) if duality < best / 2 else (best, stalled + 1)
-        waves = LongWaves.of(grid, found, passes) if has_blocks else None
-        direction = passes.preconditioned(grid, found, waves, on_grid)
+        stalled += 1
+        if duality < best / 2:
+            best = duality
+            stalled = 0
+
+        # Direction, equation (9): the preconditioned residual.
+        waves = LongWaves.of(grid, free, passes) if has_blocks else None
+        direction = passes.preconditioned(grid, free, waves, on_grid)
         # Conjugate to the step before, on the cells that are free now.
-        direction, requested_size = passes.conjugate(direction, residual, previous, on_grid, cells, under_load)
+        direction, requested_size = passes.conjugate(direction, free.residual, previous, on_grid, cells, under_load)
         previous = response = None  # frees the last response before the next one is computed
-        caution = CAUTION if waves is None else CAUTION_WITH_BLOCKS
-        requested_size, requested_duality = caution * requested_size, max(duality, 1e-300)
+        requested_size *= CAUTION if waves is None else CAUTION_WITH_BLOCKS
+        requested_duality = max(duality, 1e-300)
 
         # Trial: a step, equation (12), cut at zero pressure, (13), and scaled to the load, (15). The load is the sum of
         # the present pressure, because a step longer than the trial would magnify its rounding error.
+        load_of_step = free.total if under_load else None
         slope = 0.0
         while stalled < PATIENCE and length >= SHORTEST_STEP:
-            trial, change, slope = passes.cut_step(held, direction, residual, length, total if under_load else None)
+            trial, change, slope = passes.cut_step(free.held, direction, free.residual, length, load_of_step)
             if slope < 0:
                 break
-            length, previous = length / 4, None
+            length /= 4
         if not slope < 0:
-            moved = held - residual / grid.largest_eigenvalue
-            trial = onto_simplex(moved, total) if under_load else xp.maximum(moved, 0)
-            change, length, best, stalled, previous = trial - held, 1.0, duality, 0, None
-            slope = inner(change, residual)
-            if not slope < 0:  # the minimum, to rounding
-                error = requested_size / max(total, 1e-300)
-                if error > tolerance and duality > rounding:
-                    raise ConvergenceError(unsolved(iteration, error, tolerance))
-                break
+            trial, change, slope = projected_gradient_step(grid, free, under_load)
+            length = 1.0
+            best = duality
+            stalled = 0
+        if not slope < 0:  # the minimum, to rounding
+            error = requested_size / max(free.total, 1e-300)
+            if error > tolerance and duality > rounding:
+                raise ConvergenceError(unsolved(iteration, error, tolerance))
+            break
 
         # Minimize the energy along the search direction, equation (11): one convolution.
         if is_extrapolated:  # replaces the displacement of the first guess, so that rounding errors do not accumulate
             response = grid.displacement(on_grid(trial, cells)).reshape(-1)
             response -= separation
-            response += given
+            response += problem.gap
         else:
             response = grid.displacement(on_grid(change, cells)).reshape(-1)
-        curvature, minimum, fraction = passes.line_search(held, trial, change, slope, response, cells)
-        was_cut = fraction < minimum
+        curvature, minimum, fraction = passes.line_search(free.held, trial, change, slope, response, cells)
+        longest = GROW_AFTER_CUT if fraction < minimum else GROW
         if is_extrapolated:  # take the whole step: the displacement is known exactly only for its end
-            fraction, is_extrapolated = 1.0, False
+            fraction = 1.0
+            is_extrapolated = False
             curvature = curvature if abs(minimum - 1) < NEARLY_MINIMUM else 0.0
-        passes.advance(pressure, separation, cells, (held, trial, change), response, fraction)
+        passes.advance(pressure, separation, cells, (free.held, trial, change), response, fraction)
         previous = (cells, change, response, curvature) if curvature > 0 else None
-        length *= min(max(minimum, SHRINK), GROW_AFTER_CUT if was_cut else GROW)
+        length *= min(max(minimum, SHRINK), longest)
 
-    if under_load:  # the approach is the separation in the contact, weighted by the pressure
-        full = math.inf if grid.definite or present is not None else float(given.mean())
-        cells = xp.flatnonzero(pressure)
-        weight = pressure[cells]
-        if full - level < NEARLY_FULL * full:
-            weight = punch_pressure(grid, separation.reshape(gap.shape), cells, level)
-        whole = float(weight.sum())
-        level = min(level + inner(weight, separation[cells] - level) / whole, full) if whole > 0 else full
-    separation -= given
-    separation *= unit
-    pressure *= unit
+    level = problem.approach_of(pressure, separation, free)
+    separation -= problem.gap
+    separation *= problem.unit
+    pressure *= problem.unit
     return ContactState(
         pressure=pressure.reshape(gap.shape),
         displacement=separation.reshape(gap.shape),
-        approach=level * unit + lowest_gap,
-        load=total * unit,
+        approach=level * problem.unit + problem.lowest_gap,
+        load=free.total * problem.unit,
         error=error,
-        bound=math.sqrt(2 * duality / found.energy) if found.energy > 0 else 0.0,
-        approach_error=duality / total * unit if total > 0 else 0.0,
+        bound=math.sqrt(2 * duality / free.energy) if free.energy > 0 else 0.0,
+        approach_error=duality / free.total * problem.unit if free.total > 0 else 0.0,
         iterations=iteration,
     )
+
+
+# -------------------------------------------------------------------------------- scaled problem, first guess, approach
+
+
+@dataclass(frozen=True)
+class ScaledProblem:
+    """Contact problem with pressures and lengths over one pressure, and lengths from the lowest point of the gap.
+
+    Under a load the pressures then add up to one.
+
+    Attributes
+    ----------
+    grid : Grid
+        Cells, boundary and body.
+    gap : array, shape (nx ny,)
+        Scaled gap without pressure at zero approach; zero at absent cells.
+    present : array of bool, shape (nx ny,), or None
+        Cells with material; None: all.
+    under_load : bool
+        Whether the load is given, not the approach.
+    unit : float
+        Pressure over the contact modulus that scales the problem: the load, or the overlap over the largest
+        displacement under unit pressure. [-]
+    lowest_gap : float
+        Smallest gap of a present cell. [m]
+    level : float
+        Scaled overlap under a given approach; zero under a load.
+    """
+
+    grid: Grid
+    gap: Array
+    present: Array | None
+    under_load: bool
+    unit: float
+    lowest_gap: float
+    level: float
+
+    @classmethod
+    def of(
+        cls, grid: Grid, gap: Array, load: float | None, approach: float | None, present: Array | None
+    ) -> ScaledProblem:
+        """Return the scaled problem; `gap` is overwritten.
+
+        Parameters
+        ----------
+        grid, gap, load, approach
+            See :func:`solve_contact`.
+        present : array of bool, shape (nx ny,), or None
+            Cells with material; None: all.
+
+        Raises
+        ------
+        ConvergenceError
+            If the approach reaches full contact, so that it does not determine the load.
+        """
+        lowest_gap = float(gap.min() if present is None else gap.reshape(-1)[present].min())
+        overlap = 0.0 if approach is None else approach - lowest_gap
+        unit = load if load is not None else (overlap / grid.largest_eigenvalue if overlap > 0 else 1.0)
+        scaled_gap = gap.reshape(-1)
+        scaled_gap -= lowest_gap
+        scaled_gap /= unit
+        if present is not None:
+            scaled_gap[~present] = 0
+        problem = cls(grid, scaled_gap, present, load is not None, unit, lowest_gap, overlap / unit)
+        if problem.is_blind and problem.full_approach - problem.level <= NEAREST_TO_FULL * problem.level:
+            raise ConvergenceError("the approach reaches full contact and does not determine the load")
+        return problem
+
+    @property
+    def is_blind(self) -> bool:
+        """Whether the approach is given and the energy does not depend on a uniform pressure."""
+        return not self.under_load and not self.grid.definite
+
+    @property
+    def full_approach(self) -> float:
+        """Scaled approach of full contact, if a uniform pressure does not displace the surface; otherwise infinite."""
+        return math.inf if self.grid.definite or self.present is not None else float(self.gap.mean())
+
+    def separation_under(self, pressure: Array) -> Array:
+        """Return the scaled separation at zero approach under a pressure, shape (nx ny,): one convolution."""
+        return self.gap + self.grid.displacement(pressure.reshape(self.grid.shape)).reshape(-1)
+
+    def first_guess(self, start: Array | None, start_displacement: Array | None) -> tuple[Array, Array]:
+        """Return the first guess of the scaled pressure, and the separation under it at zero approach.
+
+        The pressure is the given one, or else uniform under a load, and proportional to the overlap of the surfaces
+        under an approach.
+
+        Parameters
+        ----------
+        start, start_displacement : array, shape (nx, ny), or None
+            Given pressure [-], and displacement under it [m]; both are overwritten.
+
+        Returns
+        -------
+        tuple of array, shape (nx ny,)
+            Scaled pressure and separation.
+        """
+        grid = self.grid
+        if start is not None:
+            pressure = start.reshape(-1)
+            pressure[pressure < 0] = 0
+            pressure /= self.unit
+        elif self.under_load:
+            pressure = grid.xp.ones(grid.size)
+        else:
+            pressure = grid.xp.maximum(self.level - self.gap, 0) / grid.largest_eigenvalue
+        if self.present is not None:
+            pressure[~self.present] = 0
+        scale = 1 / float(pressure.sum()) if self.under_load else 1.0
+        pressure *= scale
+        if start_displacement is None:
+            return pressure, self.separation_under(pressure)
+        separation = start_displacement.reshape(-1)
+        separation *= scale / self.unit
+        separation += self.gap
+        return pressure, separation
+
+    def approach_of(self, pressure: Array, separation: Array, free: Free) -> float:
+        """Return the scaled approach of the solution.
+
+        Under a load it is the separation in the contact, weighted by the pressure, and at most the approach of full
+        contact.
+
+        Parameters
+        ----------
+        pressure, separation : array, shape (nx ny,)
+            Scaled pressure, and separation at zero approach.
+        free : Free
+            Free cells of the solution.
+        """
+        if not self.under_load:
+            return free.level
+        full = self.full_approach
+        contact = self.grid.xp.flatnonzero(pressure)
+        weight = pressure[contact]
+        if full - free.level < NEARLY_FULL * full:
+            weight = punch_pressure(self.grid, separation.reshape(self.grid.shape), contact, free.level)
+        whole = float(weight.sum())
+        if not whole > 0:
+            return full
+        return min(free.level + inner(weight, separation[contact] - free.level) / whole, full)
 
 
 def coarse_guess(grid: Grid, gap: Array, load: float) -> Array:
@@ -311,6 +420,59 @@ def coarse_guess(grid: Grid, gap: Array, load: float) -> Array:
     grid.convolutions += coarse.convolutions
     rows, columns = (xp.arange(n) * m // n for n, m in sides)
     return found.pressure[xp.ix_(rows, columns)]
+
+
+# ----------------------------------------------------------------------------------------------- steps of an iteration
+
+
+def passes_of(xp: Any) -> Any:
+    """Return the module of the passes over the free cells for arrays of NumPy, or of CuPy on a GPU."""
+    if not hasattr(xp, "RawKernel"):
+        return host
+    from roughvisc.mechanics.contact import kernels
+
+    return kernels
+
+
+def duality_gap(free: Free, under_load: bool) -> float:
+    """Return the duality gap, an upper bound on the excess of the energy over its minimum."""
+    lowest = min(free.least, free.level)
+    if under_load:
+        return max(free.weighted - lowest * free.total, 0.0)
+    return abs(free.weighted - free.level * free.total) + free.total * (free.level - lowest)
+
+
+def duality_rounding(grid: Grid, free: Free) -> float:
+    """Return the rounding error of the duality gap."""
+    highest = max(free.most, -free.least, 0.0)
+    return ROUNDING * free.total * (highest + grid.self_influence * free.highest_pressure)
+
+
+def is_solved(free: Free, error: float, tolerance: float, duality: float, rounding: float) -> bool:
+    """Return whether the pressure is accurate enough.
+
+    Parameters
+    ----------
+    free : Free
+        Free cells. If they carry nothing although the surfaces overlap, a step has emptied all cells.
+    error, tolerance : float
+        Estimated relative error of the pressure, and the largest one.
+    duality, rounding : float
+        Duality gap, and its rounding error.
+    """
+    is_empty = free.size > 0 and free.total == 0
+    return error <= tolerance and duality <= max(GAP_SLACK * tolerance * free.energy, rounding) and not is_empty
+
+
+def projected_gradient_step(grid: Grid, free: Free, under_load: bool) -> tuple[Array, Array, float]:
+    """Return the pressure after a projected-gradient step, its change, and the slope of the energy along the step.
+
+    The slope is negative unless the pressure is the minimum, to rounding.
+    """
+    moved = free.held - free.residual / grid.largest_eigenvalue
+    trial = onto_simplex(moved, free.total) if under_load else grid.xp.maximum(moved, 0)
+    change = trial - free.held
+    return trial, change, inner(change, free.residual)
 
 
 def onto_simplex(values: Array, total: float) -> Array:
@@ -353,23 +515,27 @@ def opening_pressure(
     return opening, grid.inverse(((opening - 1) / widest).astype(np.float32)).astype(float) * widest
 
 
-def load_error(
-    grid: Grid, separation: Array, contact: Array, level: float, present: Array | None, total: float
-) -> float:
+def load_error(problem: ScaledProblem, pressure: Array, separation: Array, free: Free) -> float:
     """Return the relative error of the load under a given approach with periodic boundaries.
 
     An error ``e`` of the gaps in the contact is equivalent to an error ``e`` of the surface. It changes the load by
     ``k`` times the mean of ``e``, where ``k = min w.(1/K)w / mean(w)^2`` over all ``w`` that vanish in the contact. The
-    shape of the gap as ``w`` makes this a bound.
+    shape of the gap as ``w`` makes this a bound. Return zero if the energy depends on the load, or if no more than a
+    quarter of the cells are in contact.
     """
-    opening, pressure = opening_pressure(grid, separation, contact, level, present)
+    if not problem.is_blind or 4 * free.touching <= problem.grid.size:
+        return 0.0
+    xp = problem.grid.xp
+    separation = separation.reshape(problem.grid.shape)
+    contact = xp.flatnonzero(pressure)
+    opening, opening_load = opening_pressure(problem.grid, separation, contact, free.level, problem.present)
     if not opening.any():
         return math.inf
-    closed = grid.xp.minimum(separation - level, 0)
-    if present is not None:
-        closed[~present.reshape(closed.shape)] = 0
-    off = float(grid.xp.maximum(separation.reshape(-1)[contact] - level, 0).sum()) - float(closed.sum())
-    return inner(opening, pressure) * off / separation.size / total
+    closed = xp.minimum(separation - free.level, 0)
+    if problem.present is not None:
+        closed[~problem.present.reshape(closed.shape)] = 0
+    off = float(xp.maximum(separation.reshape(-1)[contact] - free.level, 0).sum()) - float(closed.sum())
+    return inner(opening, opening_load) * off / separation.size / free.total
 
 
 def punch_pressure(grid: Grid, separation: Array, contact: Array, level: float) -> Array:
