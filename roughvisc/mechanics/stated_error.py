@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from roughvisc.mechanics.grid import fft_of
-from roughvisc.mechanics.memory import STIFF
+from roughvisc.mechanics.memory import STIFF, LayerMemory
 from roughvisc.mechanics.program import Slide
 from roughvisc.mechanics.scene import SOFT, Point, Scene
 from roughvisc.mechanics.tangential import tangential_force
@@ -212,6 +212,8 @@ def skipped_friction(scene: Scene, before: Point, point: Point, slide: Slide, st
     """
     memory = scene.memory
     follows = before.history.earlier is not None
+    if isinstance(memory, LayerMemory):  # the compliance depends on the wave
+        return 0.0
     if follows or not (memory.may_ring and memory.grows(step, STIFF)) or point.is_open:
         return 0.0
     missed = memory.compliance(step) - float(memory.crept(step)[0]) / step

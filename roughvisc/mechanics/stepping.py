@@ -389,7 +389,9 @@ def accepted(
     steps, apart = [], max(state.work_apart, after.work_apart, key=abs)
     for point, work in zip(inside, works[:-1], strict=True):
         left = 1.0 if pair.is_soft else memory.remaining(point.time - fine.time)
-        shared = entering(scene, fine, point) + state.difference.shared * memory.remaining(point.time - fine.time)
+        uncertain = entering(scene, fine, point)
+        uncertain = uncertain if pair.is_soft else max(uncertain, entered_early(scene, fine, point))
+        shared = uncertain + state.difference.shared * memory.remaining(point.time - fine.time)
         between = replace(error.or_larger(state.difference, left), shared=shared)
         curved = math.hypot(state.work_curved, work_error if point.time <= pair.first.time else last_error)
         within = replace(
