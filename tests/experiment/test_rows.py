@@ -47,7 +47,10 @@ def assert_constant_load_or_approach_works_through_the_approach(ds, steps, progr
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
-@pytest.mark.parametrize("material", MATERIALS)
+@pytest.mark.parametrize(
+    "material",
+    [pytest.param(one, marks=pytest.mark.thorough if one in ("maxwell", "own") else ()) for one in MATERIALS],
+)
 def test_every_row__states_an_error_and_agrees_with_its_fields_and_steps(material, program):
     pressed = PROGRAMS[program]
     settings = {"boundary": "periodic" if pressed.slides else "free", "tolerance": 3e-2, "progress": False}

@@ -116,7 +116,7 @@ def test_kernels__precondition_as_numpy_does(kernels, seed, shape, contact):
         np.testing.assert_allclose(*directions, rtol=1e-5, atol=1e-5 * float(abs(directions[1]).max()))
 
 
-@pytest.mark.parametrize("given", [{"load": 2.0}, {"approach": 0.8}])
+@pytest.mark.parametrize("given", [{"load": 2.0}, pytest.param({"approach": 0.8}, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
 def test_kernels__solve_contact_as_numpy_does(kernels, monkeypatch, given, boundary):
     monkeypatch.setattr(solver, "BLOCKS_FROM", 30)
