@@ -322,7 +322,11 @@ def transient_error(scene: Scene, start: Point, first: Point, end: Point, *, by_
     modal = slope * last**2 / 2 + weight * twice[1]
     bend = (changes[1] / last - changes[0] / early) / (last - early)
     smooth = (changes[0] / early - bend * early) * last**2 / 2 + bend * last**3 / 3
-    return float(abs((modal - smooth) * (end.force - start.force)) / last)
+    error = abs(modal - smooth) / last
+    if scene.memory.may_ring and scene.memory.grows(early, STIFF):  # the first step takes the pressure as constant
+        missed = 1 - (integral[1] - integral[0]) / (last - early) * last / integral[1]
+        error = max(error, 2 / 3 * abs(missed * changes[1]))  # the weight of the first step in the parabola
+    return float(error * abs(end.force - start.force))
 
 
 def work_of_step(scene: Scene, before: Point, after: Point, slides: bool = False) -> float:
