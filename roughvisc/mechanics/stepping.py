@@ -206,6 +206,7 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
             kept_force=max([state.kept_force, *(row.force for row in rows)]),
             kept_approach=max([state.kept_approach, *(abs(row.approach) for row in rows)]),
         )
+        del rows  # frees their memory while the next steps are computed
         if steps and steps[-1].is_end:
             steps[-1] = steps[-1]._replace(state=state)
         yield from steps

@@ -112,7 +112,8 @@ def test_two_observers_of_one_file__lose_nothing(study, tmp_path, monkeypatch):
     fields = 'fields = ["pressure", "gap"]\n'
     one = read_cases(study(fields + LEAKAGE))
     two = read_cases(study(fields + "[observe.conductance]\nresistivity = [1.0, 1.0]\n"))
-    rv.run(one[0], tmp_path / "out", progress=False)
+    (unobserved,) = read_cases(study(fields))  # the same key
+    rv.run(unobserved, tmp_path / "out", progress=False)
     plain, refused = rv.observables.leakage, []
 
     def meanwhile(*given, **named):
