@@ -84,7 +84,7 @@ _PLANS = {"cpu": 1.0, "gpu": 3.0}
 #: Number of solutions (pressure and displacement) and number of copies of each exponential at the peak. First without
 #: memory; then for a pair of steps with its coarse solution and first guesses; last for a pair of soft steps, with the
 #: ends of its steps and the exponentials of the step before.
-_ELASTIC, _PAIR, _SOFT_PAIR = (4, 0), (5, 5), (7, 9)
+_ELASTIC, _PAIR, _SOFT_PAIR = (2, 0), (5, 5), (7, 9)
 #: Fields of an exponential if the compliances depend on the wave: a spectrum, padded in free space.
 _SPECTRUM = {"periodic": 1.1, "mirror": 1.1, "free": 4.2}
 #: Fields of a friction curve, measured at 256 x 250: operators, Newton's steps, the vectors of GMRES that are in use; a

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import product
 from numbers import Integral
 from typing import Any
 
@@ -223,13 +224,19 @@ def squared_slopes(h: xr.DataArray, periodic: bool = False, depth: float = math.
     z = np.pad(h.values, beyond, mode="wrap")
     along_x, along_y = (np.diff(z, axis=0) / dx) ** 2, (np.diff(z, axis=1) / dy) ** 2
     sides = slice(None, -1), slice(1, None)
-    squares = np.stack([along_x[:, j] + along_y[i] for i in sides for j in sides])
-    counts = np.isfinite(squares)
+    at_x = at_y = lowest = None
     if depth < math.inf:
         at_x, at_y = np.maximum(z[1:], z[:-1]), np.maximum(z[:, 1:], z[:, :-1])
-        highest = np.stack([np.maximum(at_x[:, j], at_y[i]) for i in sides for j in sides])
-        counts &= highest >= np.nanmax(h.values) - depth
-    return squares[counts] if counts.any() else np.array([np.nan])
+        lowest = np.nanmax(h.values) - depth
+    corners = []
+    for i, j in product(sides, sides):  # one after the other: together they take the memory of many fields
+        squares = along_x[:, j] + along_y[i]
+        counts = np.isfinite(squares)
+        if lowest is not None:
+            counts &= np.maximum(at_x[:, j], at_y[i]) >= lowest
+        corners.append(squares[counts])
+    squares = np.concatenate(corners)
+    return squares if squares.size else np.array([np.nan])
 
 
 def noted(h: xr.DataArray, line: str, **attrs: Any) -> xr.DataArray:
