@@ -22,7 +22,7 @@ SOFT = 10.0
 
 @dataclass(frozen=True)
 class Corner:
-    """Passage from one segment of a program to the next.
+    """Transition from one segment of a program to the next.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class Corner:
 
 
 def corners_of(program: Program, can_jump: bool) -> list[Corner]:
-    """Return the corner at the end of each segment; `can_jump` is whether the body has an instantaneous compliance."""
+    """Return the corners of a program, for a body that has (`can_jump`) or lacks an instantaneous compliance."""
     corners = []
     for last, following in pairwise((*program.segments, *program.segments[-1:])):
         changes = following.control != last.control

@@ -30,7 +30,7 @@ from roughvisc.mechanics.tangential import tangential_force
 #: on workflows/benchmarks/accuracy.py. Then the same for bodies with hardly any instantaneous compliance, whose first
 #: steps are of first order.
 STATED, STATED_SOFT = (0.6, 0.6), (1.0, 1.5)
-#: Part of the stated error before a pair that is stated after it at least, as far as relaxation leaves it.
+#: Least stated error after a pair, over the part of the error before the pair that relaxation leaves.
 LASTING = 0.5
 #: Uncertain part of the pressure of a cell that has just entered the contact, if the pressure is due to creep.
 ENTERED = 0.3
@@ -76,7 +76,15 @@ class Difference:
     shared: float = 0.0
 
     def at_least(self, before: Difference, left: float) -> Difference:
-        """Return at least a part of the errors before a pair; relaxation leaves the part `left` of a pressure."""
+        """Return the errors, each at least a part of the error before a pair.
+
+        Parameters
+        ----------
+        before : Difference
+            Errors before the pair.
+        left : float
+            Part of an error of the pressure that relaxation leaves until the end of the pair.
+        """
         part = LASTING * left
         return replace(
             self,

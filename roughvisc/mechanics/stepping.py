@@ -309,7 +309,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         slide = scene.motions[number] if times else None
         error = difference(scene, fine, at_end, coarse_at_end, slide, is_kept=bool(times))
         shared = state.difference.shared * scene.memory.remaining(pair.length)
-        if times and not pair.is_soft:  # other pairs cost nothing: their rows carry on what is left of it
+        if times and not pair.is_soft:  # a pair without a kept row adds nothing to this error
             shared += entered_early(scene, fine, pair.second)
         if scene.time_step is not None:
             break
@@ -363,11 +363,9 @@ def accepted(
     relaxed = 1.0 if pair.is_soft else memory.remaining(pair.length)
     error = error.at_least(state.difference, relaxed)
 
-    inside = [pair.first]
+    inside = [row_at_middle(scene, pair, number) if pair.first.time in times else pair.first]
     for time in times:
-        if time == pair.first.time:
-            inside = [row_at_middle(scene, pair, number) if point is pair.first else point for point in inside]
-        elif time != pair.second.time:
+        if time not in (pair.first.time, pair.second.time):
             inside.append(row_inside(scene, pair, time, number))
     inside.sort(key=lambda point: point.time)
     is_first = fine.time == scene.program.corners[number]
