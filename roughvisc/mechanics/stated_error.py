@@ -5,7 +5,7 @@ difference, times a factor, as the error at the end of the pair. Both solutions 
 
 - the difference has parts of first and of second order and may pass through zero (:meth:`Difference.at_least`);
 - the pressure of a cell that has just entered the contact is uncertain (:func:`entering`, :func:`entered_early`);
-- slow slides of soft bodies have the phase error of BDF2 at one and at two cells a step (:func:`phase_error`);
+- slow slides have a phase error at one and at two cells a step (:func:`phase_error`);
 - their first step misses the friction (:func:`skipped_friction`).
 
 The work of a pair is an integral over parabolas (:func:`work_of_pair`). Its error is the difference to straight lines,
@@ -182,13 +182,13 @@ def friction(scene: Scene, point: Point, slide: Slide) -> float:
 
 
 def phase_error(scene: Scene, point: Point, slide: Slide, step: float) -> float:
-    r"""Return the error of the friction force of a slow slide by one cell a step. [N]
+    r"""Return the error of the friction force of a slide by one cell a step, due to the rate of each wave. [N]
 
-    A wave that slides by the phase :math:`\theta` in a step of BDF2 has the rate of the phase
-    :math:`\sin\theta\,(2 - \cos\theta)` in place of :math:`\theta`. The friction of a slow wave is proportional to this
-    rate. Steps that the compliance hardly grows in do not use BDF2, and have no such error.
+    A wave that slides by the phase :math:`\theta` in a step has the rate :math:`\sin\theta\,(2 - \cos\theta)` in place
+    of :math:`\theta` with BDF2, and :math:`\sin\theta` if it is linear within steps. The friction of a slow wave is
+    proportional to this rate, also in the coarse solution, so that the difference of both may vanish.
     """
-    if not (scene.memory.may_ring and scene.memory.grows(step, STIFF)) or point.is_open:
+    if scene.memory.is_elastic or point.is_open:
         return 0.0
     fft, axis, count = fft_of(scene.grid.xp), slide.axis, point.pressure.shape[slide.axis]
     spectra = [fft.rfft(field, axis=axis) for field in (point.pressure, scene.memory.displacement(point.history)[0])]
@@ -196,7 +196,10 @@ def phase_error(scene: Scene, point: Point, slide: Slide, step: float) -> float:
     phase = 2 * math.pi / count * wave
     power = (spectra[0].conj() * spectra[1]).imag.sum(axis=1 - axis)[1 : (count + 1) // 2]
     friction_of_wave = 2 / count * power * phase / scene.grid.spacing[axis] * scene.grid.cell_area
-    off = scene.grid.xp.sin(phase) * (2 - scene.grid.xp.cos(phase)) / phase - 1
+    rate = scene.grid.xp.sin(phase)
+    if scene.memory.may_ring and scene.memory.grows(step, STIFF):
+        rate *= 2 - scene.grid.xp.cos(phase)
+    off = rate / phase - 1
     return float(abs(friction_of_wave * off).sum())
 
 
