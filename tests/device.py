@@ -92,16 +92,42 @@ class DeviceArray(np.lib.mixins.NDArrayOperatorsMixin):
     )
 
 
-METHODS = ("all", "any", "astype", "copy", "max", "mean", "min", "nonzero", "reshape", "sum", "take", "tolist", "view")
+METHODS = (
+    "all",
+    "any",
+    "astype",
+    "conj",
+    "copy",
+    "max",
+    "mean",
+    "min",
+    "nonzero",
+    "reshape",
+    "sum",
+    "take",
+    "tolist",
+    "view",
+)
 for name in METHODS:
     setattr(DeviceArray, name, on_device(getattr(np.ndarray, name)))
     getattr(DeviceArray, name).__doc__ = None  # with examples that are not ours
 
 #: Functions of the device.
 NAMES = [
-    *("abs", "arange", "ascontiguousarray", "bincount", "concatenate", "count_nonzero", "cumsum", "einsum", "empty"),
+    *(
+        "abs",
+        "arange",
+        "ascontiguousarray",
+        "bincount",
+        "concatenate",
+        "cos",
+        "count_nonzero",
+        "cumsum",
+        "einsum",
+        "empty",
+    ),
     *("empty_like", "exp", "flatnonzero", "full", "ix_", "maximum", "minimum", "multiply", "ones", "ones_like"),
-    *("pad", "ptp", "roll", "sort", "sqrt", "stack", "take", "where", "zeros", "zeros_like"),
+    *("pad", "ptp", "roll", "sin", "sort", "sqrt", "stack", "take", "where", "zeros", "zeros_like"),
 ]
 globals().update({name: on_device(getattr(np, name)) for name in NAMES})
 fft = SimpleNamespace()

@@ -75,7 +75,7 @@ class Difference:
     friction: float = 0.0
     shared: float = 0.0
 
-    def at_least(self, before: Difference, left: float) -> Difference:
+    def at_least(self, before: Difference, left: float, left_of_friction: float = 0.0) -> Difference:
         """Return the errors, each at least a part of the error before a pair.
 
         Parameters
@@ -84,6 +84,8 @@ class Difference:
             Errors before the pair.
         left : float
             Part of an error of the pressure that relaxation leaves until the end of the pair.
+        left_of_friction : float
+            Part of the friction force that is left, see :func:`left_of_friction`.
         """
         part = LASTING * left
         return replace(
@@ -91,7 +93,7 @@ class Difference:
             pressure=max(self.pressure, part * before.pressure),
             force=max(self.force, part * before.force),
             approach=max(self.approach, LASTING * before.approach),
-            friction=max(self.friction, left * before.friction),  # both solutions may share all of it
+            friction=max(self.friction, max(left, left_of_friction) * before.friction),  # both may share all of it
         )
 
     def or_larger(self, other: Difference, part: float = 1.0) -> Difference:
@@ -179,6 +181,18 @@ def force_of_entered(scene: Scene, before: Point, after: Point) -> float:
 def friction(scene: Scene, point: Point, slide: Slide) -> float:
     """Return the friction force of a point. [N]"""
     return tangential_force(scene.grid, point.pressure, scene.memory.displacement(point.history)[0], slide)
+
+
+def left_of_friction(scene: Scene, before: Point, after: Point, slide: Slide | None) -> float:
+    """Return the part of the friction force that is left between two points of a contact, at most one.
+
+    The phase errors of a slide have changed the friction of all modes by about the same part, so that the error of the
+    friction force decays as the force does.
+    """
+    if slide is None or scene.memory.is_elastic:
+        return 0.0
+    former = abs(friction(scene, before, slide))
+    return min(abs(friction(scene, after, slide)) / former, 1.0) if former > 0 else 0.0
 
 
 def phase_error(scene: Scene, point: Point, slide: Slide, step: float) -> float:

@@ -35,6 +35,7 @@ from roughvisc.mechanics.stated_error import (
     entered_early,
     entering,
     friction,
+    left_of_friction,
     phase_error,
     skipped_friction,
     touch,
@@ -360,8 +361,8 @@ def accepted(
         Length of the next pair. [s]
     """
     fine, memory, number = pair.before, scene.memory, state.segment
-    relaxed = 1.0 if pair.is_soft else memory.remaining(pair.length)
-    error = error.at_least(state.difference, relaxed)
+    relaxed, slide = 1.0 if pair.is_soft else memory.remaining(pair.length), scene.motions[number]
+    error = error.at_least(state.difference, relaxed, left_of_friction(scene, fine, pair.second, slide))
 
     inside = [row_at_middle(scene, pair, number) if pair.first.time in times else pair.first]
     for time in times:
@@ -391,7 +392,10 @@ def accepted(
         uncertain = entering(scene, fine, point)
         uncertain = uncertain if pair.is_soft else max(uncertain, entered_early(scene, fine, point))
         shared = uncertain + state.difference.shared * memory.remaining(point.time - fine.time)
-        between = replace(error.or_larger(state.difference, left), shared=shared)
+        between = error.or_larger(state.difference, left).at_least(
+            state.difference, 0.0, left_of_friction(scene, fine, point, slide)
+        )
+        between = replace(between, shared=shared)
         curved = math.hypot(state.work_curved, work_error if point.time <= pair.first.time else last_error)
         within = replace(
             state, work=state.work + work, work_curved=curved, work_apart=apart, work_relaxed=after.work_relaxed

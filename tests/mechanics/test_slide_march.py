@@ -138,7 +138,7 @@ def test_partial_contact__settles_at_what_steady_sliding_finds(speed):
     got = force(found, steps[-1])
     assert got == pytest.approx(exact.power_force, rel=5e-3)
     off = abs(got - exact.power_force)
-    assert off <= steps[-1].difference.friction < 10 * off
+    assert off <= steps[-1].difference.friction < max(10 * off, 2e-3 * got)  # at 0.16 the error passes through zero
     after = steps[-1]
     by_slopes = float(np.sum(after.point.pressure * slope(found.gap, PERIOD / 128, 0))) * found.grid.cell_area
     assert by_slopes == pytest.approx(got, rel=5e-3)
