@@ -6,7 +6,7 @@
 import re
 import sys
 
-from roughvisc.study.audit import LIMITS
+from roughvisc.judge.audit import LIMITS
 from roughvisc.variables import OF_STEPS, STATUS_MEANINGS, STEP, VARIABLES
 
 

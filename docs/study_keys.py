@@ -13,7 +13,7 @@ import roughvisc as rv
 from roughvisc.arguments import arguments, units_of
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.mechanics.materials import MODELS
-from roughvisc.mechanics.materials.creep import stiffened
+from roughvisc.mechanics.materials.material import stiffened
 from roughvisc.mechanics.program import UNITS, Program
 from roughvisc.settings import Numerics, Settings
 from roughvisc.study.machine_history import read_history

@@ -13,14 +13,14 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
+from roughvisc.experiment.problem import Problem
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.labels import warnings_of
 from roughvisc.mechanics.body import Body
-from roughvisc.mechanics.materials.creep import Material
+from roughvisc.mechanics.materials.material import Material
 from roughvisc.mechanics.program import Direction, Program
-from roughvisc.settings import Boundary, Edge, Missing, Numerics, Problem, Settings
+from roughvisc.settings import Boundary, Edge, Missing, Numerics, Settings
 from roughvisc.solve import Progress, solve
-from roughvisc.study import storage as storage  # registers ds.roughvisc
 from roughvisc.units import Quantity, quantities
 
 if TYPE_CHECKING:
@@ -294,14 +294,14 @@ def run(
     ConvergenceError
         If the contact of a step or at a speed is not solved; no result is written.
     """
+    from roughvisc.runs.netcdf import open_result
+    from roughvisc.runs.run import result_folder
+    from roughvisc.runs.sweep import run_one
     from roughvisc.study.case import case_given
-    from roughvisc.study.execution.run import result_folder
-    from roughvisc.study.execution.sweep import run_one
-    from roughvisc.study.storage.netcdf import open_result
 
     stated = case_given(case)
     if want is None:
         return open_result(run_one(stated, result_folder(stated, out), progress=progress, threads=threads))
-    from roughvisc.study import target
+    from roughvisc.judge import wanted_accuracy as target
 
     return target.run(stated, out, want=want, progress=progress is not False, threads=threads)

@@ -117,7 +117,7 @@ def units_of(function: Callable[..., Any]) -> dict[str, str]:
 
     Examples
     --------
-    >>> from roughvisc.mechanics.materials.prony import maxwell
+    >>> from roughvisc.mechanics.materials.models import maxwell
     >>> units_of(maxwell)["viscosity"], units_of(maxwell)["poisson"]
     ('Pa s', '1')
     """

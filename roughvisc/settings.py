@@ -1,4 +1,4 @@
-"""Settings of a solve, each declared and checked once, and the problem that they belong to.
+"""Settings of a solve, each declared and checked once.
 
 The signature of :func:`roughvisc.simulate` repeats the names that users need. :class:`Numerics` holds the others, which
 are one argument there. The tables ``[solve]`` and ``[keep]`` of a study, the key of a case and the refusals of an
@@ -7,30 +7,18 @@ experiment follow from the fields.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
 
 import numpy as np
-import xarray as xr
-from numpy.typing import NDArray
 
 from roughvisc.arguments import listed_names
 from roughvisc.errors import InputError
-from roughvisc.mechanics.body import Body
-from roughvisc.mechanics.program import Program, instant
-from roughvisc.topography.borders import is_mirrored, is_periodic
-from roughvisc.topography.grid import checked
-from roughvisc.topography.recipes import BOUNDARIES, indenter_of, recipe_name
 from roughvisc.units import listed, number
 from roughvisc.variables import FIELDS
 
-if TYPE_CHECKING:
-    from roughvisc.experiment.base import Experiment
-
-Array = NDArray[np.float64]
-#: :meth:`Problem.resolved` replaces ``auto`` by one of the other values.
+#: :meth:`roughvisc.experiment.base.Experiment.resolved` replaces ``auto`` by one of the other values.
 Boundary = Literal["auto", "free", "periodic", "mirror"]
 Missing = Literal["refuse", "absent"]
 Edge = Literal["error", "accept"]
@@ -47,18 +35,8 @@ WORDS: dict[str, tuple[str, ...]] = {
 OVER_TIME = ("times", "missing", "edge", "time_step")
 #: Smallest tolerance. Rounding errors are of this order, and a run with a smaller tolerance would not end.
 FINEST_TOLERANCE = 1e-12
-#: Smallest and largest number of cells for which the grid error is estimated by default. The coarser run takes 0.8 to
-#: 0.9 of the time of the first run at 32 x 32 cells, 0.4 to 0.5 at 128 x 128, 0.25 to 0.3 at 256 x 256, and 0.2 at
-#: 512 x 512: more than a third on fewer cells than the smallest number.
-GRID_ERROR_CELLS = 256 * 256, 512 * 512
 #: Largest number of kept times.
 MOST_TIMES = 1_000_000
-#: Times that differ by at most this many units in the last place are equal: rounding of sums and logarithms of times.
-_ROUNDING = 64
-#: Latest first kept time of a hold, as a part of the hold. [-]
-_FIRST = 1e-3
-#: Relative numbers of kept times of a ramp or a slide, a hold, and a period of a cycle.
-_RAMP, _HOLD, _PERIOD = 2.0, 3.0, 16.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,177 +124,3 @@ class Settings(Numerics):
         found = {"tolerance": tolerance, "times": times, "fields": names, "grid_error": grid_error}
         for name, value in found.items():
             object.__setattr__(self, name, value)
-
-
-#: Expected boundary if ``auto`` cannot be resolved.
-OPEN_BOUNDARY = """\
-one of these, because the surface does not show what lies beyond its border
-  a nominally flat scan that stands for a larger surface: boundary = "mirror"; "periodic" if it repeats as it is
-  an indenter or a single bump whose contact stays inside: boundary = "free"
-  a scan that is itself the whole body: boundary = "free" with edge = "accept\""""
-
-
-def boundary_of(h: xr.DataArray) -> Literal["free", "periodic"] | None:
-    """Return the boundary that a surface was made for; None for scans, plain arrays and all other surfaces.
-
-    The user must state the boundary if this function returns None. The recipe of an indenter counts only if it
-    reproduces the heights, because the grid may have to grow. The recipe of waves or roughness, and the record of
-    mirroring, count only if the attribute ``period`` gives the sides of the grid and the borders meet
-    (:func:`is_periodic`).
-
-    Parameters
-    ----------
-    h : xarray.DataArray, dims (x, y)
-        Heights. [m]
-
-    Returns
-    -------
-    {"free", "periodic"} or None
-        ``free`` for an indenter; ``periodic`` for waves, self-affine roughness and mirrored surfaces.
-
-    Examples
-    --------
-    >>> from roughvisc.topography.recipes import sphere, wavy
-    >>> ball, waves = sphere(1e-2, 1e-3, 8), wavy(1e-6, 1e-3, 1e-3, 8)
-    >>> boundary_of(ball), boundary_of(waves), boundary_of(ball + waves)
-    ('free', 'periodic', None)
-    """
-    if indenter_of(h) is not None:
-        return "free"
-    made = BOUNDARIES.get(recipe_name(h)) == "periodic" and is_periodic(h)
-    return "periodic" if made or is_mirrored(h) else None
-
-
-@dataclass(frozen=True)
-class Problem:
-    """Surface, body and settings of an experiment.
-
-    Attributes
-    ----------
-    height : xarray.DataArray, dims (x, y)
-        Profile, peaks up. [m]
-    body : Body
-        The body under it.
-    settings : Settings
-        Numerical settings and the fields to keep.
-    """
-
-    height: xr.DataArray
-    body: Body
-    settings: Settings
-
-    def resolved(self, experiment: Experiment) -> Problem:
-        """Return the problem that an experiment computes: ``auto`` is replaced in boundary and grid error.
-
-        Raises
-        ------
-        InputError
-            If the heights are invalid, the boundary must be stated, or a setting has no meaning in the experiment.
-        """
-        height, settings = checked(self.height, "height", least=1), self.settings
-        boundary, grid_error, (fewest, most) = settings.boundary, settings.grid_error, GRID_ERROR_CELLS
-        if boundary == "auto":
-            boundary = experiment.boundary or ("free" if settings.edge == "accept" else boundary_of(height))
-        if boundary is None:
-            raise InputError(key="boundary", found="auto", expected=OPEN_BOUNDARY)
-        if grid_error == "auto":  # only if no further field has to be kept
-            needs_pressure = experiment.axis == "time" and "pressure" not in settings.fields
-            grid_error = fewest <= height.size <= most and not needs_pressure
-        settings = replace(settings, boundary=boundary, grid_error=grid_error)
-        for name, found, expected in experiment.unsupported(settings):
-            raise InputError(key=name, found=found, expected=expected)
-        return replace(self, height=height, settings=settings)
-
-
-def kept_times(
-    program: Program, times: int | Sequence[float] | None, *spacings: tuple[float, float]
-) -> tuple[float, ...] | None:
-    """Return the times to keep, ascending. [s]
-
-    Times within rounding of a corner of the program are moved to the corner. Times in a slide are moved to the nearest
-    time at which a whole number of cells has been slid.
-
-    Parameters
-    ----------
-    program : Program
-        The loading program.
-    times : int, sequence of float or None
-        Number of times, see :func:`spread_times`; or the times [s]; or None for every accepted step.
-    *spacings : tuple of float
-        Cell sides of each grid that slides. [m]
-
-    Raises
-    ------
-    InputError
-        If a time lies outside the program.
-    """
-    if times is None:
-        return None
-    corners, duration = np.array(program.corners), program.duration
-    kept: list[float] = []
-    for value in spread_times(program, times) if isinstance(times, int) else np.unique(np.asarray(times, dtype=float)):
-        nearest = float(corners[np.argmin(np.abs(corners - value))])
-        snapped = nearest if abs(nearest - value) <= _ROUNDING * math.ulp(nearest) else float(value)
-        if not 0 <= snapped <= duration:
-            raise InputError(f"times holds {value:g} s: expected times from 0 to the program's end at {duration:g} s")
-        if not kept or snapped - kept[-1] > _ROUNDING * math.ulp(snapped):
-            kept.append(snapped)
-    if not (spacings and program.slides):
-        return tuple(kept)
-    found = np.array(kept)
-    for segment, began, end in zip(program.segments, program.corners, program.corners[1:], strict=False):
-        if segment.slide is not None:
-            cells = math.gcd(*map(segment.slide.cells, spacings))
-            for place in np.flatnonzero((found > began) & (found < end)):
-                taken = round((found[place] - began) / (end - began) * cells)
-                found[place] = instant(began, end, taken, cells)
-    return tuple(np.unique(found).tolist())
-
-
-def spread_times(program: Program, count: int) -> Array:
-    """Return a number of times, spread over the program; they are denser where the result changes faster.
-
-    Parameters
-    ----------
-    program : Program
-        The loading program.
-    count : int
-        Number of times. If the program has more corners, an even selection of corners is kept, with the last one.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Ascending; fewer than `count` if the program has no duration. [s]
-
-    Notes
-    -----
-    All corners of the program are kept. The other times are distributed in the proportion of two per ramp or slide,
-    three per hold and sixteen per period of a cycle. In a hold they are spaced evenly in the logarithm of the time
-    since its start. This spacing begins at a third of the segment before or a thousandth of the hold, whichever is
-    less. In other segments the times are spaced evenly.
-    """
-    corners = np.unique(program.corners)
-    further = count - len(corners)
-    if further <= 0:
-        return corners[np.linspace(len(corners) - 1, 0, count).round().astype(int)[::-1]]
-    weights = np.zeros(len(program.segments))
-    for row, segment in enumerate(program.segments):
-        if segment.duration > 0:
-            periods = segment.duration / segment.period if segment.amplitude else 0.0
-            weights[row] = _PERIOD * periods if periods else _HOLD if segment.holds else _RAMP
-    if not weights.any():
-        return corners
-    exact = weights * further / weights.sum()
-    numbers = np.floor(exact).astype(int)
-    largest_remainders = np.argsort(numbers - exact, kind="stable")[: further - int(numbers.sum())]
-    numbers[largest_remainders] += 1
-
-    found, before = [corners], math.inf
-    for began, segment, many in zip(program.corners, program.segments, numbers, strict=False):
-        if segment.duration > 0:
-            parts = np.arange(1, many + 1) / (many + 1)
-            if segment.holds and many:
-                parts = min(_FIRST, before / (3 * segment.duration)) ** (1 - parts)
-            found.append(began + parts * segment.duration)
-            before = segment.duration
-    return np.unique(np.concatenate(found))

@@ -22,9 +22,9 @@ from roughvisc.experiment.accuracy import filled_warning
 from roughvisc.experiment.base import Experiment, Outgrown, Row, Rows
 from roughvisc.experiment.grid_error import with_grid_error
 from roughvisc.experiment.loading import Loading
+from roughvisc.experiment.problem import Problem
 from roughvisc.labels import CARRIED, TITLE, label
 from roughvisc.mechanics.grid import transform_library
-from roughvisc.settings import Problem
 from roughvisc.topography.grid import nominal_area
 from roughvisc.variables import OF_STEPS, STEP, STEPPED, VARIABLES
 from roughvisc.version import program_version
@@ -139,7 +139,7 @@ def solve(
         threads = CPU_COUNT if threads == 1 and is_alone else threads
     elif isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
         raise InputError(key="threads", found=threads, expected="a whole number of at least 1, or None")
-    problem = problem.resolved(experiment)
+    problem = experiment.resolved(problem)
     height, settings = problem.height, problem.settings
     runs_again = settings.grid_error and isinstance(experiment, Loading)  # a curve of steady sliding does so itself
     needed = ("pressure",) if runs_again and "pressure" not in settings.fields else ()

@@ -14,9 +14,9 @@ import traceback
 from pathlib import Path
 
 from roughvisc.errors import RoughviscError
+from roughvisc.runs import checkpoint
+from roughvisc.runs.run import run_case
 from roughvisc.study.case import read_study
-from roughvisc.study.execution.run import run_case
-from roughvisc.study.storage import checkpoint
 
 #: What is asked of the system of a folder's files. Not listing it: what is not found is not there.
 EVENTS = ("open", "os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.truncate", "os.utime")

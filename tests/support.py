@@ -14,8 +14,8 @@ from roughvisc.mechanics.body import HALF_SPACE
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.memory import Memory
 from roughvisc.mechanics.stepping import Scene
+from roughvisc.runs.netcdf import open_result
 from roughvisc.study.case import read_study, vary
-from roughvisc.study.storage.netcdf import open_result
 
 #: The ball, the rubber and the press of BALL.
 RADIUS, LOAD, SIZE, TIMES = 10e-3, 5e-3, (1e-3, 1e-3), [0.0, 0.1, 0.2]

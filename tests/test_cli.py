@@ -15,10 +15,10 @@ from support import BALL
 
 import roughvisc as rv
 from roughvisc.cli import main
+from roughvisc.runs import run as run_module
+from roughvisc.runs.netcdf import write_result
 from roughvisc.study.case import read_cases, vary
-from roughvisc.study.execution import run as run_module
 from roughvisc.study.first_study import RUBBER
-from roughvisc.study.storage.netcdf import write_result
 from roughvisc.topography.scans import raw_height
 
 SPHERE = BALL[BALL.index("generate") : BALL.index("[material]")]

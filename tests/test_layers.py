@@ -1,4 +1,4 @@
-"""Eight layers: a file imports from its own part of the package and from layers below it."""
+"""Ten layers: a file imports from its own part of the package and from layers below it."""
 
 import ast
 import pathlib
@@ -15,6 +15,8 @@ LAYERS = (
     ("experiment settings solve",),
     ("observables",),
     ("study",),
+    ("runs",),
+    ("judge",),
     ("plot",),
     ("reports",),
     ("__init__ __main__ api cli",),
@@ -50,6 +52,29 @@ def test_imports__point_downward():
                     upward.add((name.as_posix(), module))
             assert part != "mechanics" or package not in ("xarray", "netCDF4", "dask", "matplotlib"), name
     assert not upward
+
+
+def modules(path):
+    """Return the modules of the package that a file imports, those for type checkers too."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def test_imports__form_no_circle():
+    """Files that import nothing of the rest are taken away until none is left."""
+    files = {}
+    for path in PACKAGE.rglob("*.py"):
+        if path.name != "__init__.py":
+            name = ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts)
+            files[name] = set(modules(path)) - {name}
+    while leaves := [name for name, imported in files.items() if not imported & files.keys()]:
+        for name in leaves:
+            del files[name]
+    assert not files
 
 
 def test_import__brings_no_heavy_library():

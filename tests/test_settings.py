@@ -12,8 +12,9 @@ from support import refused
 
 import roughvisc as rv
 from roughvisc.experiment.loading import Loading
+from roughvisc.experiment.problem import Problem
 from roughvisc.experiment.sliding import SteadySliding
-from roughvisc.settings import WORDS, Numerics, Problem, Settings
+from roughvisc.settings import WORDS, Numerics, Settings
 from roughvisc.study.case import Case, vary
 from roughvisc.variables import FIELDS
 
@@ -113,7 +114,7 @@ def test_grid_error__is_estimated_by_default_if_it_takes_at_most_a_third(cells, 
     pressed, slid = Loading(rv.Program().load(1e-3, over=0)), SteadySliding(speeds=1.0, load=1.0)
 
     def found(experiment, **settings):
-        return Problem(ball, body, Settings(**settings)).resolved(experiment).settings.grid_error
+        return experiment.resolved(Problem(ball, body, Settings(**settings))).settings.grid_error
 
     assert found(pressed) is stated
     assert not found(pressed, fields=()), "no pressure is kept"

@@ -28,8 +28,8 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
       roughvisc plot results/focus_variation-study --out figures
     """
     from roughvisc.plot.save import results_of_sweep, save_figures_of_files, save_sweep_figures
-    from roughvisc.study.execution.cluster import threads_each
-    from roughvisc.study.storage.folder import results_at
+    from roughvisc.runs.cluster import threads_each
+    from roughvisc.runs.folder import results_at
 
     paths = results_at(result)
     together = results_of_sweep(result) if len(paths) > 1 else None
@@ -52,7 +52,7 @@ def report(results: Path, out: Path | None) -> None:
     Example:
       roughvisc report results/focus_variation-study -o report.html
     """
-    from roughvisc.study.execution.cluster import threads_each
+    from roughvisc.runs.cluster import threads_each
 
     say_path(screen(), "Report", rv.report(results, out, processes=threads_each(1)))
 
@@ -70,7 +70,7 @@ def table(results: Path, out: Path | None) -> None:
     Example:
       roughvisc table results/focus_variation-study -o table.csv
     """
-    from roughvisc.study.storage.folder import atomic_write
+    from roughvisc.runs.folder import atomic_write
 
     if results.is_dir():
         path = out or results / "table.csv"
@@ -103,7 +103,7 @@ def audit(result: Path, **properties: Any) -> None:
       roughvisc audit results/focus_variation-study --work-of-adhesion "50 mJ/m^2"
     """
     from roughvisc.cli.study_tables import audit_table
-    from roughvisc.study.storage.folder import results_at
+    from roughvisc.runs.folder import results_at
 
     given = {name: value for name, value in properties.items() if value is not None}
     for path in results_at(result):
@@ -123,7 +123,7 @@ def verify(results: Path) -> None:
     Example:
       roughvisc verify results/focus_variation-study
     """
-    from roughvisc.study.storage.netcdf import verify as verified
+    from roughvisc.runs.netcdf import verify as verified
 
     found = verified(results)
     bad = [flaw for flaw in found.values() if flaw]
@@ -147,7 +147,7 @@ def clean(results: Path, everything: bool) -> None:
     Example:
       roughvisc clean results/focus_variation-study
     """
-    from roughvisc.study.storage.folder import clean_folder
+    from roughvisc.runs.folder import clean_folder
 
     for path in (removed := clean_folder(results, everything=everything)):
         click.echo(printable(f"removed {path.name}"))

@@ -92,9 +92,9 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, **op
       roughvisc scan focus_variation.x3p --plot scan.png
       roughvisc scan focus_variation.x3p --to scan.nc --card scan.toml
     """
-    from roughvisc.cli.tables import findings_table, scan_table
+    from roughvisc.cli.summaries import findings_table, scan_table
     from roughvisc.plot.save import is_made_by, write_figure
-    from roughvisc.study.storage.folder import atomic_write, write_text
+    from roughvisc.runs.folder import atomic_write, write_text
     from roughvisc.topography.scans import card_text, known_suffix, surface_table
 
     height = _opened(file, options)
@@ -141,9 +141,9 @@ def new(file: Path | None, out: Path | None, contact: str, **options: Any) -> No
       roughvisc run focus_variation-study.toml
       roughvisc new focus_variation.x3p --contact "20 %" --out other.toml
     """
-    from roughvisc.cli.tables import findings_table
+    from roughvisc.cli.summaries import findings_table
+    from roughvisc.runs.folder import atomic_write, write_text
     from roughvisc.study.first_study import first_pressure, starter_study
-    from roughvisc.study.storage.folder import atomic_write, write_text
     from roughvisc.topography import EXAMPLE
     from roughvisc.units import number
 

@@ -93,7 +93,7 @@ def run(
       roughvisc run focus_variation-study.toml --for "5 % mean_gap"
       roughvisc run focus_variation-study.toml --scheduler-file scheduler.json
     """
-    from roughvisc.study.execution.run import result_folder
+    from roughvisc.runs.run import result_folder
 
     cases = rv.read_cases(study)
     if device is not None:
@@ -158,7 +158,7 @@ def parse_targets(texts: Sequence[str]) -> dict[str, str]:
     >>> parse_targets(["1 % mean_gap"])
     {'mean_gap': '1 %'}
     """
-    from roughvisc.study.neighbours import QUANTITIES  # slow to import
+    from roughvisc.judge.budget import QUANTITIES  # slow to import
     from roughvisc.units import is_quantity
 
     found: dict[str, str] = {}
@@ -175,7 +175,7 @@ def _chosen(
     case: Case, targets: tuple[str, ...], folder: Path, console: Console, plots: bool, **computing: Any
 ) -> Case:
     """Return the case with grid and tolerance for some target errors, and show the budget of each target."""
-    from roughvisc.study.target import choose
+    from roughvisc.judge.wanted_accuracy import choose
 
     tell = partial(say, console)
     want = parse_targets(targets)
@@ -188,13 +188,13 @@ def _chosen(
 
 def _run_one(case: Case, folder: Path, console: Console, plots: bool, threads: int | None) -> None:
     """Compute, store, draw and summarise one case."""
-    from roughvisc.cli.tables import result_table
+    from roughvisc.cli.summaries import result_table
     from roughvisc.plot.save import DEFAULT, save_figures
     from roughvisc.progress import reporting
-    from roughvisc.study.execution.cluster import threads_each
-    from roughvisc.study.execution.run import is_result_of
-    from roughvisc.study.execution.sweep import run_one
-    from roughvisc.study.storage.folder import case_path
+    from roughvisc.runs.cluster import threads_each
+    from roughvisc.runs.folder import case_path
+    from roughvisc.runs.run import is_result_of
+    from roughvisc.runs.sweep import run_one
 
     if is_result_of(case, case_path(folder, case.key, "result")):
         say(console, "Already finished: nothing to compute")
@@ -209,11 +209,13 @@ def _run_one(case: Case, folder: Path, console: Console, plots: bool, threads: i
 
 def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, **computing: Any) -> None:
     """Compute and summarise a sweep; raise its failure, if there is one."""
-    from roughvisc.cli.tables import sweep_table
-    from roughvisc.study.execution.run import REFUSED
-    from roughvisc.study.execution.sweep import Display, run_study
-    from roughvisc.study.storage.folder import LOG
-    from roughvisc.study.storage.sweep_data import CASES, numbers_of, sweep_cases
+    from roughvisc.cli.summaries import sweep_table
+    from roughvisc.runs.csv_files import CASES
+    from roughvisc.runs.display import Display
+    from roughvisc.runs.folder import LOG
+    from roughvisc.runs.run import REFUSED
+    from roughvisc.runs.sweep import run_study
+    from roughvisc.runs.sweep_data import numbers_of, sweep_cases
 
     found = run_study(cases, folder, client=client, display=Display(not console.quiet, console), **computing)
     outcomes, numbers = list(found.values()), numbers_of(sweep_cases(cases))
@@ -248,8 +250,8 @@ def trade(study: Path, out: Path | None, accuracy: str, quantity: str | None, qu
       roughvisc trade focus_variation-study.toml --accuracy 0.1% --quantity mean_gap
     """
     from roughvisc.cli.study_tables import trade_table
-    from roughvisc.study.execution.run import result_folder
-    from roughvisc.study.trade import FOLDER
+    from roughvisc.judge.trade import FOLDER
+    from roughvisc.runs.run import result_folder
     from roughvisc.units import number
 
     part = number(accuracy, "1", "accuracy", above=0, below=1)
@@ -288,8 +290,8 @@ def budget(study: Path, out: Path | None, workers: int | None, quiet: bool, **kn
       roughvisc budget focus_variation-study.toml --modulus-error 10% --cutoff "1 um"
       roughvisc budget focus_variation-study.toml --quantity mean_gap --population ensemble
     """
-    from roughvisc.study.execution.run import result_folder
-    from roughvisc.study.neighbours import FOLDER
+    from roughvisc.judge.budget import FOLDER
+    from roughvisc.runs.run import result_folder
 
     names = list(known.pop("quantity")) or ["contact_area"]
     case = rv.read_study(study)
@@ -310,7 +312,7 @@ def _show_budget(console: Console, found: xr.Dataset, folder: Path, name: str, p
 def _write(console: Console, what: str, dataset: xr.Dataset, path: Path, draw: Any) -> None:
     """Write a NetCDF file and its figure."""
     from roughvisc.plot.save import write_figure
-    from roughvisc.study.storage.netcdf import write_dataset
+    from roughvisc.runs.netcdf import write_dataset
 
     say_path(console, what, write_dataset(dataset, path))
     if draw:

@@ -12,11 +12,11 @@ from rich.console import Group
 from rich.text import Text
 
 from roughvisc.cli.group import counted
-from roughvisc.cli.tables import columns, readable, titled, two_columns
-from roughvisc.experiment.resources import amount
-from roughvisc.study.audit import Audit
+from roughvisc.cli.summaries import columns, readable, titled, two_columns
+from roughvisc.experiment.memory_limit import amount
+from roughvisc.judge.audit import Audit
+from roughvisc.judge.trade import cheapest, pareto_front
 from roughvisc.study.case_text import names_of, value_text
-from roughvisc.study.trade import cheapest, pareto_front
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, VARIABLES, axis_of
 

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from roughvisc.experiment.kept_times import kept_times
 from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.solver import PERIMETER_CORRECTION
@@ -18,7 +19,7 @@ from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.scene import Scene
 from roughvisc.mechanics.step_control import SHORTEST_PAIR
 from roughvisc.mechanics.stepping import Step
-from roughvisc.settings import Settings, kept_times
+from roughvisc.settings import Settings
 from roughvisc.topography.borders import JUMP, border_mismatch
 from roughvisc.topography.grid import squared_slopes
 from roughvisc.topography.recipes import indenter_of, is_analytic

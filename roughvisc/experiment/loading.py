@@ -24,8 +24,10 @@ from roughvisc.experiment.accuracy import (
     wakes_of,
 )
 from roughvisc.experiment.base import Experiment, Outgrown, Row, Rows
+from roughvisc.experiment.kept_times import kept_times
+from roughvisc.experiment.memory_limit import WORTH_ASKING, require_loading
+from roughvisc.experiment.problem import Problem
 from roughvisc.experiment.profile import BEYOND, GROWTH, Domain, Profile, choose_surface
-from roughvisc.experiment.resources import WORTH_ASKING, require_loading
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.solver import contact_area
 from roughvisc.mechanics.grid import Grid, arrays_of, to_host
@@ -35,7 +37,7 @@ from roughvisc.mechanics.scene import SOFT, Packed, Point, Scene
 from roughvisc.mechanics.stated_error import Difference
 from roughvisc.mechanics.stepping import State, Step, march
 from roughvisc.mechanics.tangential import tangential_force
-from roughvisc.settings import Problem, Settings, kept_times
+from roughvisc.settings import Settings
 from roughvisc.topography.recipes import grown
 from roughvisc.units import unit_for
 from roughvisc.variables import STATUS_MEANINGS

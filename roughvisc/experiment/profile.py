@@ -18,11 +18,12 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import ConvergenceError, InputError
+from roughvisc.experiment.problem import Problem
 from roughvisc.mechanics.body import HALF_SPACE, Kernel
 from roughvisc.mechanics.contact.solver import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.program import Program
-from roughvisc.settings import Missing, Problem, Settings
+from roughvisc.settings import Missing, Settings
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.recipes import grown, indenter_of
 

@@ -26,15 +26,16 @@ from roughvisc.experiment.grid_error import (
     hidden_peak,
     missing_of_zero,
 )
+from roughvisc.experiment.memory_limit import curve_bytes, require_memory
+from roughvisc.experiment.problem import Problem
 from roughvisc.experiment.profile import Profile
-from roughvisc.experiment.resources import curve_bytes, require_memory
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.solver import contact_area
 from roughvisc.mechanics.grid import Boundary, arrays_of, to_host
 from roughvisc.mechanics.program import Direction
 from roughvisc.mechanics.steady_sliding import Sliding, SteadyState, steady_state
 from roughvisc.mechanics.tangential import slope
-from roughvisc.settings import OVER_TIME, Problem, Settings
+from roughvisc.settings import OVER_TIME, Settings
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.spectrum import resample_periodic
 from roughvisc.units import Quantity, format_quantity, number, quantities

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.creep import Material, check_material
+from roughvisc.mechanics.materials.material import Material, check_material
 from roughvisc.mechanics.materials.series import complex_compliance, over_frequencies
 from roughvisc.mechanics.quadrature import rule
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.creep import Material
+from roughvisc.mechanics.materials.material import Material
 from roughvisc.mechanics.program import Program
 from roughvisc.units import Quantity, number, quantities
 

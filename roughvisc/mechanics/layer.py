@@ -23,7 +23,7 @@ import scipy  # which imports a submodule when it is first used
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel, cell_mean, check_one_body, corner_sum
-from roughvisc.mechanics.materials.creep import Material, Prony
+from roughvisc.mechanics.materials.material import Material, Prony
 from roughvisc.mechanics.materials.series import lattice, nonnegative, over_frequencies
 from roughvisc.units import Quantity, format_quantity, number, quantities
 

@@ -33,7 +33,7 @@ from numpy.typing import ArrayLike
 from roughvisc.mechanics.body import Body, wave_limits
 from roughvisc.mechanics.grid import Grid, namespace
 from roughvisc.mechanics.layer import LayeredBody, LayerSeries, crept, interpolated, layer_series
-from roughvisc.mechanics.materials.creep import Material, Prony, parts_of_step
+from roughvisc.mechanics.materials.material import Material, Prony, parts_of_step
 from roughvisc.mechanics.materials.series import series
 
 Array = Any  # an array of NumPy or CuPy

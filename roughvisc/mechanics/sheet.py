@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.arguments import one_of
 from roughvisc.mechanics.body import HALF_SPACE, Body, Kernel, cell_mean, check_one_body
-from roughvisc.mechanics.materials.creep import Material
+from roughvisc.mechanics.materials.material import Material
 from roughvisc.mechanics.quadrature import panels
 from roughvisc.units import Quantity, number, quantities
 

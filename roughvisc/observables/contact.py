@@ -14,7 +14,7 @@ from roughvisc.errors import InputError
 from roughvisc.labels import boundary_of, label
 from roughvisc.mechanics.transport import flow as flow_through
 from roughvisc.mechanics.transport import frozen_contact, label_clusters
-from roughvisc.observables.frames import by_frame, frame_by_frame, need
+from roughvisc.observables.history import by_frame, frame_by_frame, need
 from roughvisc.topography.grid import spacing
 from roughvisc.units import Quantity, in_si, is_quantity, number, quantities
 from roughvisc.variables import VARIABLES

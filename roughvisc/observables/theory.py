@@ -15,9 +15,9 @@ from roughvisc.errors import InputError
 from roughvisc.experiment.sliding import SlidingGrid
 from roughvisc.labels import label
 from roughvisc.mechanics.body import HALF_SPACE, Body
-from roughvisc.mechanics.materials.creep import Material, check_material
+from roughvisc.mechanics.materials.material import Material, check_material
 from roughvisc.mechanics.steady_sliding import Sliding
-from roughvisc.observables.frames import expect_result, history
+from roughvisc.observables.history import expect_result, history
 from roughvisc.topography.grid import nominal_area, rms_slope, spacing
 from roughvisc.topography.spectrum import wavevectors
 

@@ -13,11 +13,11 @@ from matplotlib.figure import Figure
 
 from roughvisc.arguments import listed_names, one_of
 from roughvisc.errors import InputError
+from roughvisc.judge.trade import format_tolerance, pareto_front, uncertainty
 from roughvisc.labels import steps_of
-from roughvisc.observables.frames import expect_result
+from roughvisc.observables.history import expect_result
 from roughvisc.observables.theory import asperity_fraction, persson_fraction
 from roughvisc.plot import style
-from roughvisc.study.trade import format_tolerance, pareto_front, uncertainty
 from roughvisc.topography.grid import nominal_area, rms_slope
 from roughvisc.units import Unit, quantities, unit_for
 from roughvisc.variables import AXES, GRID_ERROR, VARIABLES, axis_of

@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from roughvisc.arguments import listed_names, one_of
 from roughvisc.errors import InputError
 from roughvisc.observables import contact, leakage
-from roughvisc.observables.frames import expect_result, need
+from roughvisc.observables.history import expect_result, need
 from roughvisc.paths import path_of
 from roughvisc.plot import style
-from roughvisc.study.storage.folder import atomic_write
+from roughvisc.runs.folder import atomic_write
 from roughvisc.topography.filters import fill, off_plane
 from roughvisc.topography.grid import cell_edges, checked, require_heights, spacing
 from roughvisc.topography.spectrum import psd

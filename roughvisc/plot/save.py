@@ -17,17 +17,17 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError, RoughviscError
-from roughvisc.observables.frames import expect_result
+from roughvisc.observables.history import expect_result
 from roughvisc.paths import path_of
 from roughvisc.plot import style
 from roughvisc.plot.curves import friction, history
 from roughvisc.plot.fields import maps, section, surface
 from roughvisc.plot.sweep import sweep_figures
 from roughvisc.progress import reporting
+from roughvisc.runs.folder import atomic_write
+from roughvisc.runs.netcdf import open_result
+from roughvisc.runs.sweep_data import open_results, read_sweep
 from roughvisc.study.case_text import file_stems
-from roughvisc.study.storage.folder import atomic_write
-from roughvisc.study.storage.netcdf import open_result
-from roughvisc.study.storage.sweep_data import open_results, read_sweep
 
 #: Name -> function of a result, variables that it needs, and a caption.
 FIGURES: dict[str, tuple[Callable[[xr.Dataset], Figure], tuple[str, ...], str]] = {

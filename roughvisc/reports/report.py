@@ -18,18 +18,18 @@ from jinja2 import Environment, PackageLoader
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
+from roughvisc.judge.audit import audit
 from roughvisc.labels import cost_of, grid_error_of, warnings_of
-from roughvisc.observables.frames import expect_result
+from roughvisc.observables.history import expect_result
 from roughvisc.paths import path_of
 from roughvisc.plot import style
 from roughvisc.plot.fields import surface
 from roughvisc.plot.save import DEFAULT, FIGURES, figures_of, in_parallel, results_of_sweep, varies_surface
 from roughvisc.plot.sweep import sweep_figures
-from roughvisc.study.audit import audit
+from roughvisc.runs.folder import no_results, recorded_failure, result_files, write_text
+from roughvisc.runs.netcdf import open_result
+from roughvisc.runs.sweep_data import numbers_of, read_sweep
 from roughvisc.study.case_text import case_words, study_text
-from roughvisc.study.storage.folder import no_results, recorded_failure, result_files, write_text
-from roughvisc.study.storage.netcdf import open_result
-from roughvisc.study.storage.sweep_data import numbers_of, read_sweep
 from roughvisc.topography.filters import off_plane
 from roughvisc.topography.parameters import parameters
 from roughvisc.units import unit_for

@@ -1,1 +1,1 @@
-"""Cases, their execution and their results: one Dataset for one case, a folder of files for many cases."""
+"""Cases and the study files that describe them."""

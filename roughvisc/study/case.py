@@ -20,7 +20,7 @@ from roughvisc.errors import InputError, RoughviscError, short_repr
 from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
 from roughvisc.mechanics.body import Body
-from roughvisc.mechanics.materials.creep import Material
+from roughvisc.mechanics.materials.material import Material
 from roughvisc.mechanics.program import Program
 from roughvisc.paths import path_of
 from roughvisc.settings import Settings
@@ -172,7 +172,7 @@ class Case:
         RoughviscError
             If a file has changed since the key was computed.
         """
-        from roughvisc.experiment.resources import require_surface  # slow to import
+        from roughvisc.experiment.memory_limit import require_surface  # slow to import
 
         before, source = self.checksums, str(self.origin or "case")
         try:

@@ -14,7 +14,7 @@ from roughvisc.experiment.grid_error import coarser
 from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.contact.solver import contact_area, solve_contact
 from roughvisc.mechanics.grid import Grid
-from roughvisc.mechanics.materials.prony import zener
+from roughvisc.mechanics.materials.models import zener
 from roughvisc.paths import shell_word
 from roughvisc.topography.conditioning import condition
 from roughvisc.topography.grid import rms_slope

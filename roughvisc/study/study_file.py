@@ -21,17 +21,18 @@ from roughvisc.arguments import a_table, call, check, located, one_key, one_of, 
 from roughvisc.errors import InputError
 from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
+from roughvisc.experiment.problem import OPEN_BOUNDARY
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.layer import layer
 from roughvisc.mechanics.materials import MODELS
-from roughvisc.mechanics.materials.creep import LARGEST_SHIFT, Material, arrhenius, shift, stiffened, wlf
+from roughvisc.mechanics.materials.material import LARGEST_SHIFT, Material, arrhenius, shift, stiffened, wlf
 from roughvisc.mechanics.program import UNITS, Program
 from roughvisc.mechanics.sheet import sheet
 from roughvisc.observables import OBSERVABLES
-from roughvisc.settings import OPEN_BOUNDARY, Settings
-from roughvisc.study.audit import audit
+from roughvisc.settings import Settings
 from roughvisc.study.machine_history import read_history
+from roughvisc.study.properties import properties
 from roughvisc.study.sweep_table import value_at
 from roughvisc.tables import FREQUENCY_UNITS, Wanted, read_table
 from roughvisc.topography.conditioning import STEPS
@@ -78,7 +79,7 @@ COLUMNS: dict[str, dict[str, Wanted]] = {
 # units
 
 _TAKING = (open_scan, combine, *RECIPES.values(), *(step.function for step in STEPS.values()), *MODELS.values(), wlf)
-_TAKING += (arrhenius, sheet, SteadySliding, Settings, *OBSERVABLES.values(), audit)
+_TAKING += (arrhenius, sheet, SteadySliding, Settings, *OBSERVABLES.values(), properties)
 #: Unit of each key, from the functions that take the arguments; ``"1"`` for a pure number.
 _UNITS = {name: unit for function in _TAKING for name, unit in units_of(function).items()}
 _UNITS |= {name: units_of(step.function).get(step.argument, "") for name, step in STEPS.items()}
@@ -299,7 +300,7 @@ def parts_of(tables: Mapping[str, Any]) -> dict[str, Any]:
             expected = f"{' or '.join(map(repr, _NEEDS[name]))} in keep.fields"
             raise InputError(key=f"observe.{name}", found=arguments, expected=expected)
     if "audit" in tables:
-        check(audit, "audit", a_table("audit", tables["audit"]))
+        check(properties, "audit", a_table("audit", tables["audit"]), data=0)
     return {"title": title, "body": body, "experiment": experiment, "settings": settings}
 
 

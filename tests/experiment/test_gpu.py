@@ -16,9 +16,10 @@ from support import BALL, FRICTION
 import roughvisc as rv
 from roughvisc.cli import main
 from roughvisc.experiment.loading import Loading
-from roughvisc.settings import Problem, Settings
+from roughvisc.experiment.problem import Problem
+from roughvisc.runs.checkpoint import CheckpointWriter
+from roughvisc.settings import Settings
 from roughvisc.solve import solve
-from roughvisc.study.storage.checkpoint import CheckpointWriter
 
 PRESS = rv.Program().pressure(2e4, over=0).hold(0.3).pressure(5e3, over=0.1)
 GPU = rv.Numerics(device="gpu")

@@ -10,9 +10,9 @@ from scipy import fft
 from support import ROUGH, refused
 
 import roughvisc as rv
-from roughvisc.experiment import resources
+from roughvisc.experiment import memory_limit as resources
+from roughvisc.experiment.memory_limit import Available, memory_available
 from roughvisc.experiment.profile import Profile
-from roughvisc.experiment.resources import Available, memory_available
 from roughvisc.study.case import read_cases
 
 LARGE = ROUGH.replace("[30, 26]", "[600, 512]")

@@ -8,7 +8,7 @@ from support import at_rows
 
 import roughvisc as rv
 from roughvisc.experiment import profile as domain
-from roughvisc.settings import kept_times
+from roughvisc.experiment.kept_times import kept_times
 from roughvisc.solve import Recorder
 from roughvisc.variables import FIELDS, STATUS_MEANINGS, VARIABLES
 

@@ -7,7 +7,7 @@ from support import refused
 
 import roughvisc as rv
 from roughvisc.experiment.grid_error import pressure_distance
-from roughvisc.settings import kept_times
+from roughvisc.experiment.kept_times import kept_times
 
 SIDE = 1e-3
 PRESS = rv.Program().pressure(1e4, over=0).hold(2e-3)

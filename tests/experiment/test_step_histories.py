@@ -3,7 +3,7 @@
 import numpy as np
 
 import roughvisc as rv
-from roughvisc.settings import spread_times
+from roughvisc.experiment.kept_times import spread_times
 
 RADIUS, SIDE, CELLS = 1e-3, 2e-4, 33
 BALL = rv.sphere(RADIUS, SIDE, CELLS)

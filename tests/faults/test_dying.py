@@ -7,10 +7,10 @@ import xarray as xr
 from dying import struck
 from support import SMALL, with_steps
 
+from roughvisc.runs.folder import clean_folder
+from roughvisc.runs.netcdf import open_result
+from roughvisc.runs.run import run_case
 from roughvisc.study.case import read_study
-from roughvisc.study.execution.run import run_case
-from roughvisc.study.storage.folder import clean_folder
-from roughvisc.study.storage.netcdf import open_result
 
 WAYS = ("kill", "ENOSPC", "EROFS", "EIO", "MemoryError")
 

@@ -14,7 +14,7 @@ from roughvisc.cli import main
 from roughvisc.cli.group import PATH
 from roughvisc.errors import RoughviscError
 from roughvisc.plot.save import in_parallel
-from roughvisc.study.execution.run import run_case
+from roughvisc.runs.run import run_case
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="files of POSIX")
 
@@ -77,7 +77,7 @@ def swept(tmp_path_factory):
 def test_no_regular_file__under_any_name_ends_in_one_sentence(
     swept, tmp_path, invoke, monkeypatch, coarse_pictures, kind, names, commands
 ):
-    monkeypatch.setattr("roughvisc.study.execution.cluster.threads_each", lambda _: 1)  # a pool takes seconds
+    monkeypatch.setattr("roughvisc.runs.cluster.threads_each", lambda _: 1)  # a pool takes seconds
     source, (other, key) = swept
     (tmp_path / "two.toml").write_text(TWO)
     for name in names:

@@ -10,9 +10,9 @@ import pytest
 import xarray as xr
 from support import SMALL, with_steps
 
+from roughvisc.runs.netcdf import open_result
+from roughvisc.runs.run import run_case
 from roughvisc.study.case import read_cases
-from roughvisc.study.execution.run import run_case
-from roughvisc.study.storage.netcdf import open_result
 
 MANY_STEPS = SMALL.replace("[keep]", 'time_step = "160 us"\n[keep]')
 TWO = MANY_STEPS + '[sweep]\n"program.0.load" = ["4 mN", "5 mN"]\n'

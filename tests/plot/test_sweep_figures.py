@@ -17,7 +17,7 @@ from roughvisc.errors import InputError
 from roughvisc.labels import label
 from roughvisc.plot.save import results_of_sweep, save_figures_of_files, save_sweep_figures
 from roughvisc.plot.sweep import sweep_figures
-from roughvisc.study.execution.run import run_case
+from roughvisc.runs.run import run_case
 
 LOADS = np.array([0.01, 0.02, 0.04])
 VISCOSITIES = [1e3, 1e4, 1e5, 1e6]

@@ -13,12 +13,13 @@ from support import BALL
 from roughvisc.cli import main
 from roughvisc.errors import InputError
 from roughvisc.reports.report import report
+from roughvisc.runs.csv_files import to_table
+from roughvisc.runs.folder import write_json
+from roughvisc.runs.run import run_case
+from roughvisc.runs.sweep_data import SWEEP as LISTED
+from roughvisc.runs.sweep_data import sweep_cases
 from roughvisc.study.case import read_cases
 from roughvisc.study.case_text import study_text
-from roughvisc.study.execution.run import run_case
-from roughvisc.study.storage.folder import write_json
-from roughvisc.study.storage.sweep_data import SWEEP as LISTED
-from roughvisc.study.storage.sweep_data import sweep_cases, to_table
 
 HOSTILE = 'Bumps & <b>dents</b> "quoted" <script>alert(1)</script>'
 SWEEP = BALL.replace('"A ball"', f"'{HOSTILE}'") + '[sweep]\n"program.0.load" = ["2 mN", "10 mN", "1 mN"]\n'

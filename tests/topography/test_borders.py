@@ -5,7 +5,7 @@ import pytest
 from scan_files import ROOT
 
 import roughvisc as rv
-from roughvisc.settings import boundary_of
+from roughvisc.experiment.problem import boundary_of
 from roughvisc.topography.borders import is_periodic
 from roughvisc.topography.conditioning import boundary_after, condition
 

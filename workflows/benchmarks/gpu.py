@@ -23,8 +23,8 @@ from memory import case_of
 
 import roughvisc as rv
 from roughvisc.mechanics.grid import arrays_of, transforms
+from roughvisc.runs.run import run_case
 from roughvisc.study.case import vary
-from roughvisc.study.execution.run import run_case
 
 TOLERANCE = 1e-3
 COMMON = {"tolerance": TOLERANCE, "fields": ("pressure",), "grid_error": False, "progress": False}

@@ -11,10 +11,10 @@ import tempfile
 from concurrent.futures import ProcessPoolExecutor
 
 from roughvisc.experiment.accuracy import memory_of
-from roughvisc.experiment.resources import PROCESS, march_bytes
+from roughvisc.experiment.memory_limit import PROCESS, march_bytes
+from roughvisc.runs.netcdf import open_result
+from roughvisc.runs.run import run_case
 from roughvisc.study.case import Case, vary
-from roughvisc.study.execution.run import run_case
-from roughvisc.study.storage.netcdf import open_result
 from roughvisc.topography.grid import nominal_area
 
 CASE = {

@@ -44,7 +44,7 @@ def variables():
     tables = (
         declared("roughvisc.variables", "VARIABLES"),
         declared("roughvisc.variables.sliding", "SLIDING"),  # of the first edition
-        declared("roughvisc.study.trade.trade", "VARIABLES"),  # of the first edition
+        declared("roughvisc.judge.trade.trade", "VARIABLES"),  # of the first edition
     )
     return {
         name: f"{one.dims} {one.units} {getattr(one, 'group', '')}".strip()

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 import roughvisc as rv
-from roughvisc.study.neighbours import QUANTITIES
+from roughvisc.judge.budget import QUANTITIES
 
 SIDE, PATCHES = 1e-3, 24
 #: Hurst exponent, cut-off in cells of the scan, roll-off over the side.

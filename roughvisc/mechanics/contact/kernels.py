@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from roughvisc.mechanics.contact import passes
+from roughvisc.mechanics.contact.free_cells import Free
 from roughvisc.mechanics.contact.long_waves import LongWaves
-from roughvisc.mechanics.contact.passes import BLOCK_ITERATIONS, BLOCK_TOLERANCE, LONGEST_STEP, Free, Last
+from roughvisc.mechanics.contact.passes import BLOCK_ITERATIONS, BLOCK_TOLERANCE, LONGEST_STEP, Last
 from roughvisc.mechanics.grid import COARSE, Grid
 
 try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from roughvisc.mechanics.contact.passes import Free
+from roughvisc.mechanics.contact.free_cells import Free
 from roughvisc.mechanics.grid import Grid
 
 Array = Any  # an array of NumPy or CuPy, depending on the grid
@@ -34,7 +34,7 @@ class LongWaves(NamedTuple):
     blocks : Grid
         Grid of the blocks.
     place : array of int
-        Block of each free cell; on a GPU, :attr:`~roughvisc.mechanics.contact.passes.Free.ends`.
+        Block of each free cell; on a GPU, :attr:`~roughvisc.mechanics.contact.free_cells.Free.ends`.
     free, left : array
         Number of free cells of each block, and sum of their residual.
     part : float

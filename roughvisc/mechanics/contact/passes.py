@@ -8,14 +8,13 @@ once.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from roughvisc.mechanics.contact.free_cells import Free
+from roughvisc.mechanics.contact.long_waves import LongWaves
 from roughvisc.mechanics.grid import Grid, namespace
-
-if TYPE_CHECKING:
-    from roughvisc.mechanics.contact.long_waves import LongWaves
 
 Array = Any  # an array of NumPy or CuPy
 #: Cells [index], change, response (whole field) and curvature of the last step.
@@ -27,46 +26,6 @@ BLOCK = 1 << 15
 #: Reduction of the residual of the equations of the blocks, and largest number of iterations. With four instead of
 #: about eight iterations, creep on 1,024 x 1,024 cells needs 3 % more convolutions of the cells and 3 % less time.
 BLOCK_TOLERANCE, BLOCK_ITERATIONS = 0.1, 4
-
-
-class Free(NamedTuple):
-    """The cells that carry pressure or penetrate.
-
-    Attributes
-    ----------
-    cells : array of int, shape (n,)
-        The free cells, in ascending order.
-    held, residual : array, shape (n,)
-        Pressure, and separation without the approach; under a load the residual has no mean.
-    level : float
-        Approach.
-    touching : int
-        Number of cells in contact.
-    size : float
-        Largest absolute residual.
-    total, highest_pressure : float
-        Sum of the pressure, and its largest value.
-    least, most : float
-        Smallest and largest separation; the approach and zero without free cells.
-    weighted, energy : float
-        Sum of pressure times separation, and of pressure times displacement.
-    ends : array of int, optional
-        On a GPU, number of free cells up to the end of each segment, a part of a row that lies in a block.
-    """
-
-    cells: Array
-    held: Array
-    residual: Array
-    level: float
-    touching: int
-    size: float
-    total: float
-    highest_pressure: float
-    least: float
-    most: float
-    weighted: float
-    energy: float
-    ends: Array | None = None
 
 
 def measure(

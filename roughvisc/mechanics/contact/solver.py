@@ -34,8 +34,9 @@ import numpy as np
 
 from roughvisc.errors import ConvergenceError
 from roughvisc.mechanics.contact import passes as host
+from roughvisc.mechanics.contact.free_cells import Free
 from roughvisc.mechanics.contact.long_waves import LongWaves
-from roughvisc.mechanics.contact.passes import Free, Last, inner
+from roughvisc.mechanics.contact.passes import Last, inner
 from roughvisc.mechanics.grid import Boundary, Grid, namespace
 
 Array = Any  # an array of NumPy or CuPy, depending on the grid

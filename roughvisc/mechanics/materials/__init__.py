@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from roughvisc.mechanics.materials.creep import Material, Prony, pair, power_law
-from roughvisc.mechanics.materials.prony import elastic, from_relaxation, kelvin_voigt, maxwell, zener
+from roughvisc.mechanics.materials.material import Material, Prony, pair, power_law
+from roughvisc.mechanics.materials.models import elastic, from_relaxation, kelvin_voigt, maxwell, zener
 from roughvisc.mechanics.materials.tables import creep_table, dynamic_table, relaxation_table
 
 _SERIES = (elastic, maxwell, kelvin_voigt, zener, from_relaxation, Prony)

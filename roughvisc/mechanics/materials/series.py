@@ -21,7 +21,7 @@ import scipy  # which imports a submodule when it is first used: scipy.optimize 
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.creep import Creep, Material, Prony, pair, pair_creep
+from roughvisc.mechanics.materials.material import Creep, Material, Prony, pair, pair_creep
 
 Array = NDArray[np.float64]
 
@@ -251,7 +251,7 @@ def complex_compliance(material: Material, frequency: ArrayLike) -> NDArray[np.c
 
     Examples
     --------
-    >>> from roughvisc.mechanics.materials.prony import zener
+    >>> from roughvisc.mechanics.materials.models import zener
     >>> found = complex_compliance(zener(1.0, 1.0, 1.0), [0.0, 1.0])  # C = 1/4 (1 + 1 / (1 + i w))
     >>> found.real.tolist(), found.imag.tolist()
     ([0.5, 0.375], [0.0, -0.125])

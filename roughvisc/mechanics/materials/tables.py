@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.creep import Prony
-from roughvisc.mechanics.materials.prony import Kind, relaxation_series, tensile_to_shear
+from roughvisc.mechanics.materials.material import Prony
+from roughvisc.mechanics.materials.models import Kind, relaxation_series, tensile_to_shear
 from roughvisc.mechanics.materials.series import lattice, nonnegative
 from roughvisc.units import Quantity, format_quantity, listed, number, quantities
 
@@ -140,7 +140,7 @@ def relaxation_table(
     Notes
     -----
     ``G(t) = G_e + sum G_k exp(-t / theta_k)`` by non-negative least squares of the relative misfit on a lattice of
-    ``theta``; then :func:`~roughvisc.mechanics.materials.prony.relaxation_series`, which is exact. Outside the
+    ``theta``; then :func:`~roughvisc.mechanics.materials.models.relaxation_series`, which is exact. Outside the
     measured times its slowest and its fastest terms determine the series.
     """
     t, values = _checked_rows(("time", "modulus"), times, moduli)

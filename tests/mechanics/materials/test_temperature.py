@@ -6,7 +6,7 @@ from samples import OF_EACH_KIND
 from support import refused
 
 import roughvisc as rv
-from roughvisc.mechanics.materials.creep import stiffened
+from roughvisc.mechanics.materials.material import stiffened
 
 ELASTIC = OF_EACH_KIND["elastic"]
 GAS_CONSTANT = 8.31446261815324  # CODATA 2018, J/(mol K)

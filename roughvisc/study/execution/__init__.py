@@ -1,1 +1,0 @@
-"""Execution of cases, in this process or on Dask."""

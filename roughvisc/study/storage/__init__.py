@@ -1,1 +1,0 @@
-"""Files: results, the index of a folder, checkpoints and records of failures."""

@@ -1,0 +1,76 @@
+"""Files of results: whole or absent, plain to every reader, lazy to ours."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+import xarray as xr
+from sample_results import hertz_creep, rough_creep
+
+import roughvisc as rv
+from roughvisc.experiment.base import Row
+from roughvisc.runs import netcdf
+from roughvisc.runs.checkpoint import CheckpointWriter
+from roughvisc.runs.netcdf import open_result, write_result
+
+
+def test_missing__of_a_punch_are_height_and_gap_alone():
+    punch, rubber = rv.flat_punch(5e-5, 2e-4, 20), rv.zener(3e6, 1e6, 1e5)
+    program = rv.Program().load(1e-4, over=0.05).hold(0.1)
+    ds = rv.simulate(punch, rubber, program, times=[0, 0.05, 0.15], edge="accept", progress=False)
+    assert {str(name) for name in ds.variables if ds[name].isnull().any()} == {"height", "gap"}
+
+
+def test_write_result__gives_the_same_numbers_back(tmp_path):
+    written = rough_creep(shape=(21, 34), frames=5)
+    path = write_result(written, tmp_path / "new" / "result.nc")
+    assert [p.name for p in path.parent.iterdir()] == ["result.nc"]
+    with open_result(path) as read:
+        assert not read["pressure"]._in_memory
+        xr.testing.assert_identical(read.load().drop_attrs(), written.drop_attrs())
+        assert read.attrs["title"] == written.attrs["title"]
+        assert read["time"].dtype.kind == "f", "seconds stay numbers"
+
+
+def test_write_result__refuses_what_is_not_declared(tmp_path):
+    with pytest.raises(KeyError, match="colour"):
+        write_result(hertz_creep((5, 6), 2).assign(colour=3.0), tmp_path / "r.nc")
+    assert not list(tmp_path.iterdir())
+
+
+def test_write_result__leaves_nothing_behind_when_it_fails(tmp_path, monkeypatch):
+    path = write_result(hertz_creep((5, 6), 2), tmp_path / "r.nc")
+    before = path.read_bytes()
+
+    def fails(*_):
+        assert any(p.name.endswith(".part.nc") for p in tmp_path.iterdir())
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(netcdf, "_write", fails)
+    with pytest.raises(OSError, match="No space left"):
+        write_result(hertz_creep((5, 6), 3), path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_write_result__holds_one_layer_of_chunks(tmp_path):
+    """Of fields that are read when they are asked for: the one before is let go first."""
+    ds = hertz_creep((257, 256), 24)
+    shape = ds["pressure"].shape
+
+    recorder = CheckpointWriter(tmp_path / "rows")
+    for row in range(shape[0]):
+        recorder.append(Row(row, {"force": 1.0}, {"pressure": np.full(shape[1:], float(row))}), "time", 0.0)
+    assert list((tmp_path / "rows").iterdir()), "some rows are in a file"
+    pressure = recorder.field("pressure", range(shape[0]), shape[1:])
+    ds = ds.assign(pressure=(ds["pressure"].dims, pressure, ds["pressure"].attrs))
+    write_result(ds, tmp_path / "first.nc")  # what is imported late is there
+    tracemalloc.start()
+    try:
+        path = write_result(ds, tmp_path / "r.nc")
+        largest = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert largest < 1.5 * ds["pressure"].nbytes / 3
+    with open_result(path) as read:
+        np.testing.assert_array_equal(read["pressure"][:, 3, 5], np.arange(24.0))
