@@ -14,7 +14,8 @@ import numpy as np
 from roughvisc.errors import TooLargeError
 from roughvisc.experiment.accuracy import memory_of
 from roughvisc.mechanics.body import Body
-from roughvisc.mechanics.grid import LARGEST_REUSED, arrays_of
+from roughvisc.mechanics.grid import arrays_of
+from roughvisc.mechanics.heap import FROM_HEAP
 from roughvisc.mechanics.memory import LayerMemory, Memory
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.scene import SOFT
@@ -138,7 +139,7 @@ def march_bytes(
     frames, surface = rows * len(settings.fields), _SURFACE + (_WHOLE if part < 1 else 0.0)
     packed = rows if is_packed and part == 1 and "pressure" in settings.fields else 0.0
     dense = frames - packed
-    copied = frames + (dense if 8 * cells <= LARGEST_REUSED else 1.0)
+    copied = frames + (dense if 8 * cells <= FROM_HEAP else 1.0)
     return 8.0 * cells * (surface + part * solved / 2 + max(part * solved / 2 + dense, copied))
 
 

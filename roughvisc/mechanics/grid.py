@@ -23,6 +23,7 @@ import scipy
 
 from roughvisc.errors import InputError
 from roughvisc.mechanics.body import HALF_SPACE, Kernel, periodic_symbol
+from roughvisc.mechanics.heap import keep_freed_memory
 
 try:
     import ducc0
@@ -42,10 +43,8 @@ THREADED_FROM = 1024**2
 APART = 16
 #: Cells a side of a block of the coarse grid.
 COARSE = 8
-#: Size up to which glibc keeps the memory of a freed array for reuse, once it has freed an array of this size. [byte]
-#: Otherwise it returns the memory to the system, and a solve takes up to 15 % more time (at 256 and 512 squared).
-LARGEST_REUSED = 31 << 20
-np.empty(LARGEST_REUSED, np.uint8)
+
+keep_freed_memory()
 
 
 def namespace(array: Array) -> Any:

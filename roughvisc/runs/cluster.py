@@ -17,12 +17,13 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib import metadata
-from itertools import count
+from itertools import count, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from roughvisc.errors import InputError, RoughviscError
 from roughvisc.experiment.memory_limit import PART, PROCESS
+from roughvisc.mechanics.heap import return_freed_memory
 from roughvisc.runs.display import Display
 from roughvisc.runs.folder import case_path
 from roughvisc.runs.run import IN_USE, Outcome, attempt
@@ -33,6 +34,11 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("roughvisc")
 
+#: Number of cases at the scheduler at a time, and least number for each worker. The first result does not wait until
+#: all cases are sent, and the memory of the scheduler does not grow with the sweep.
+_WINDOW, _CASES_AHEAD = 200, 4
+#: Time between two looks at finished cases. [s]
+_POLL_EVERY = 0.02
 #: Time between two reports of one case. [s]
 _REPORT_EVERY = 0.5
 #: Time for running cases to finish their step after an interrupt. [s]
@@ -157,7 +163,7 @@ def threads_each(processes: int) -> int:
 
 
 def distribute(
-    texts: Mapping[str, str],
+    cases: Mapping[str, Case],
     folder: Path,
     display: Display,
     client: Client,
@@ -169,8 +175,8 @@ def distribute(
 
     Parameters
     ----------
-    texts : dict
-        Key -> case as JSON.
+    cases : dict
+        Key -> case.
     folder : Path
         Results folder, absolute.
     display : Display
@@ -195,13 +201,13 @@ def distribute(
     stop_file = folder / f".{name}.part.stop"
     settings = {"folder": str(folder), "stop_file": str(stop_file), "name": name, "threads": threads, "own": own}
     futures: dict[Future[Outcome], str] = {}
-    workers: dict[str, list[str]] = {key: [] for key in texts}  # in the order in which they began each case
+    workers: dict[str, list[str]] = {key: [] for key in cases}  # in the order in which they began each case
     number, taken_over = count(), set[str]()
     finished = as_completed([], loop=client.loop)
 
     def submit(keys: Sequence[str]) -> None:
         names = [f"{name}-{key}-{next(number)}" for key in keys]
-        new = client.map(on_worker, [texts[key] for key in keys], keys, key=names, pure=False, **settings)
+        new = client.map(on_worker, [cases[key].to_json() for key in keys], keys, key=names, pure=False, **settings)
         futures.update(zip(new, keys, strict=True))
         finished.update(new)
 
@@ -217,8 +223,13 @@ def distribute(
     client.subscribe_topic(name, heard)
     alone_since = time.monotonic()
     try:
-        submit(list(texts))
-        while futures:
+        waiting = iter(cases)
+        while True:
+            room = max(_WINDOW, _CASES_AHEAD * len(client.nthreads())) - len(futures)
+            if room > 0 and (keys := list(islice(waiting, room))):
+                submit(keys)
+            if not futures:
+                break
             for future in finished.next_batch(block=False):
                 key = futures.pop(future)
                 outcome = _outcome(key, future)
@@ -233,7 +244,7 @@ def distribute(
                     submit([key])
                 else:
                     raise RoughviscError(_LOST)
-            time.sleep(0.1)
+            time.sleep(_POLL_EVERY)
             if time.monotonic() - alone_since > _ALONE_AFTER:
                 alone_since = time.monotonic()
                 if not client.nthreads():
@@ -328,6 +339,8 @@ def on_worker(
             return Outcome(key, "hindered", f"on {worker.address}: {error}; {expected}", type(error).__name__)
         except KeyboardInterrupt:  # the exception would end the worker
             return Outcome(key, "interrupted")
+        finally:
+            return_freed_memory()
 
 
 def _take_signals(worker: Worker, own: bool) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 
 from rich.console import Console
@@ -12,6 +14,9 @@ from roughvisc.progress import Bars, clock
 from roughvisc.runs.run import Outcome
 from roughvisc.study.case import Case
 from roughvisc.study.case_text import value_text
+
+#: Time between two moves of the bars by running cases. [s]
+_MOVE_EVERY = 0.1
 
 
 class Display:
@@ -31,7 +36,10 @@ class Display:
         self._names: dict[str, str] = {}
         self._at: dict[str, Callable[[float, float], str]] = {}
         self._running: dict[str, float] = {}  # computed fraction of each program
-        self._ended: dict[str, Outcome] = {}
+        self._computed = 0.0  # sum of these fractions
+        self._ended: set[str] = set()
+        self._kinds = Counter[str]()
+        self._moved = -math.inf  # time of the last move of a bar
         self._began = time.monotonic()
 
     def begin(self, cases: Sequence[Case], numbers: Mapping[str, int]) -> None:
@@ -48,15 +56,21 @@ class Display:
         """Move the bar of a running case, from any thread; both times are zero when it begins."""
         with self._lock:
             if key not in self._ended:
-                self._running[key] = now / end if end else 0.0
+                fraction = now / end if end else 0.0
+                self._computed += fraction - self._running.get(key, 0.0)
+                self._running[key] = fraction
+                if end and time.monotonic() - self._moved < _MOVE_EVERY:
+                    return
+                self._moved = time.monotonic()
                 self._bars.reached(self._names[key], now, end, self._at[key](now, end) if end else "")
                 self._move()
 
     def ended(self, outcome: Outcome) -> None:
         """Close the bar of a case, and write the message of a failed case."""
         with self._lock:
-            self._ended[outcome.key] = outcome
-            self._running.pop(outcome.key, None)
+            self._ended.add(outcome.key)
+            self._kinds[outcome.kind] += 1
+            self._computed -= self._running.pop(outcome.key, 0.0)
             self._bars.close(self._names[outcome.key])
             self._move()
         if outcome.kind != "done":
@@ -73,12 +87,12 @@ class Display:
 
     def _move(self) -> None:
         """Move the bar of the sweep."""
-        self._bars.reached("sweep", sum(self._running.values()) + len(self._ended), len(self._names), self._summary())
+        self._bars.reached("sweep", self._computed + len(self._ended), len(self._names), self._summary())
         self._bars.line("sweep")
 
     def _summary(self) -> str:
-        kinds = [outcome.kind for outcome in self._ended.values()]
-        parts = [f"{kinds.count('done')} of {len(self._names)} cases done"]
+        parts = [f"{self._kinds['done']} of {len(self._names)} cases done"]
         for kind in ("failed", "hindered"):
-            parts += [f"{kinds.count(kind)} {kind}"] if kind in kinds else []
+            if self._kinds[kind]:
+                parts.append(f"{self._kinds[kind]} {kind}")
         return ", ".join([*parts, *([f"{len(self._running)} running"] if self._running else [])])

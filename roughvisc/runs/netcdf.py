@@ -266,7 +266,7 @@ def write_result(dataset: xr.Dataset, path: str | Path) -> Path:
     Every reader supports the filter zlib, which is used at level 1. netCDF4 is called directly: on a Dask worker xarray
     would request a lock from the scheduler for every variable, although only this process uses the temporary file.
     """
-    root = label(dataset).assign_attrs(Conventions="CF-1.11", result_format=RESULT_FORMAT)
+    root = as_stored(dataset)
     steps = steps_of(dataset)
     with atomic_write(path) as temporary:
         try:
@@ -290,6 +290,12 @@ def write_result(dataset: xr.Dataset, path: str | Path) -> Path:
             number = errno.ENOSPC if full else errno.EIO
             raise OSError(number, os.strerror(number), str(path)) from error
     return Path(path)
+
+
+def as_stored(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a result with the attributes that its file states."""
+    root = label(dataset).assign_attrs(Conventions="CF-1.11", result_format=RESULT_FORMAT)
+    return root.assign_attrs(_readable(root.attrs))
 
 
 def _declare(place: netCDF4.Dataset, part: xr.Dataset) -> list[tuple[netCDF4.Variable, xr.Variable]]:

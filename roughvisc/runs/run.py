@@ -24,8 +24,8 @@ from roughvisc.labels import warnings_of
 from roughvisc.paths import path_of
 from roughvisc.runs.checkpoint import CheckpointWriter
 from roughvisc.runs.folder import case_path, existing_part, lock_case, require_writable, unusable
-from roughvisc.runs.netcdf import DamagedError, open_result, write_result
-from roughvisc.runs.sweep_data import Entry, read_entry
+from roughvisc.runs.netcdf import DamagedError, as_stored, open_result, write_result
+from roughvisc.runs.sweep_data import Entry, entry_of, read_entry
 from roughvisc.solve import Progress, solve
 from roughvisc.study.case import Case, labels_of
 from roughvisc.version import program_version
@@ -154,10 +154,22 @@ def run_case(
     OSError
         If the disk is full; the last checkpoint is kept.
     """
-    folder = Path(folder)
+    return _run(case, Path(folder), progress, stop, checkpoint_seconds, threads)[0]
+
+
+def _run(
+    case: Case,
+    folder: Path,
+    progress: bool | Progress = False,
+    stop: Callable[[], bool] | None = None,
+    checkpoint_seconds: float = 30.0,
+    threads: int | None = None,
+) -> tuple[Path, Entry | None]:
+    """Run one case unless its file exists; return the path, and the entry of a file that was written now."""
     path = case_path(folder, case.key, "result")
+    entry = None
     if is_result_of(case, path) and not any(folder.glob(f".{case.key}.*")):
-        return path  # finished, without leftovers to remove
+        return path, None  # finished, without leftovers to remove
     require_writable(folder, "since the case is not finished")
     made = list(filterfalse(Path.exists, (folder, *folder.parents)))
     try:
@@ -177,6 +189,7 @@ def run_case(
                 try:
                     dataset = compute(case, keeper, progress=progress, threads=threads)
                     write_result(dataset, path)
+                    entry = entry_of(path, as_stored(dataset))
                 except RoughviscError as error:
                     if not error.transient:  # it would fail again in the same way
                         keeper.remove()
@@ -196,7 +209,7 @@ def run_case(
         for place in made:  # rmdir removes only empty folders
             with suppress(OSError):
                 place.rmdir()
-    return path
+    return path, entry
 
 
 def is_result_of(case: Case, path: Path) -> bool:
@@ -269,8 +282,8 @@ def attempt(case: Case, folder: Path, *, progress: Callable[[float, float], None
     """Run a case with some settings of :func:`run_case` and return its outcome; raise only ``KeyboardInterrupt``."""
     began, kind, trace = time.perf_counter(), "hindered", ""
     try:
-        entry = read_entry(run_case(case, folder, progress=progress, **settings))
-        return outcome_of(entry, seconds=time.perf_counter() - began)
+        path, entry = _run(case, folder, progress, **settings)
+        return outcome_of(entry or read_entry(path), seconds=time.perf_counter() - began)
     except MemoryError as error:
         name, advice = type(error).__name__, "roughvisc plan says how much a case needs, and fewer --workers leave more"
         message = f"not enough memory; the last checkpoint is kept: {advice}"

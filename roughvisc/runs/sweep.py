@@ -8,7 +8,8 @@ from __future__ import annotations
 import errno
 import json
 import logging
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, nullcontext
 from functools import partial
 from pathlib import Path
@@ -46,6 +47,9 @@ if TYPE_CHECKING:
     from distributed import Client
 
 log = logging.getLogger("roughvisc")
+
+#: Time in which a cluster on this machine starts: imports of its processes. [s]
+_START = 3.0
 
 
 def sweep(
@@ -235,29 +239,68 @@ def _computed(
     threads: int | None,
 ) -> Iterator[Outcome]:
     """Compute cases on the workers of a client, in processes of a local cluster, or in this process."""
+    todo = dict(todo)
     processes = min(threads_each(1) if workers is None else workers, len(todo))
+    if client is None and workers is None and processes > 1:
+        for outcome in _while_a_cluster_would_start(todo, folder, display, threads):
+            del todo[outcome.key]
+            yield outcome
+        processes = min(processes, len(todo))
     if not todo or (client is None and (not processes or (workers is None and processes == 1))):
         for key, case in todo.items():
             display.reached(key, 0.0, 0.0)
             yield attempt(case, folder, progress=partial(display.reached, key), threads=threads or threads_each(1))
         return
-    texts = {key: case.to_json() for key, case in todo.items()}
     if client is not None:
         require_same_version(client)
         log.info("dashboard: %s", client.dashboard_link)
-        yield from distribute(texts, folder, display, client, threads)
+        yield from distribute(todo, folder, display, client, threads)
         return
-    while texts:
+    while todo:
         large = {}
         with local_client(processes) as own:
-            for outcome in distribute(texts, folder, display, own, threads or threads_each(processes), own=True):
+            for outcome in distribute(todo, folder, display, own, threads or threads_each(processes), own=True):
                 if outcome.error == "TooLargeError" and workers is None and processes > 1:
-                    large[outcome.key] = texts[outcome.key]
+                    large[outcome.key] = todo[outcome.key]
                 else:
                     yield outcome
-        texts, processes = large, max(1, min(processes // 2, len(large)))
+        todo = large
+        processes = max(1, min(processes // 2, len(large)))
         if large:
             display.say(f"{len(large)} cases need more memory: they are computed in fewer processes ({processes})")
+
+
+def _while_a_cluster_would_start(
+    todo: Mapping[str, Case], folder: Path, display: Display, threads: int | None
+) -> Iterator[Outcome]:
+    """Compute cases in this process for the time in which a cluster would start, and all if little more is needed.
+
+    A case that is not finished then has a checkpoint, from which a worker continues to the same bits.
+    """
+    began = time.monotonic()
+    total = len(todo)
+    finished = 0
+    is_over = False
+
+    def stop() -> bool:
+        nonlocal is_over
+        spent = time.monotonic() - began
+        is_over = spent > _START and spent / max(finished, 1) * (total - finished) > _START
+        return is_over
+
+    for key, case in list(todo.items()):
+        display.reached(key, 0.0, 0.0)
+        progress = partial(display.reached, key)
+        try:
+            outcome = attempt(case, folder, progress=progress, stop=stop, threads=threads or threads_each(1))
+        except KeyboardInterrupt:
+            if not is_over:  # Ctrl-C
+                raise
+            return
+        finished += 1
+        yield outcome
+        if stop():
+            return
 
 
 def _record(outcome: Outcome, case: Case, folder: Path) -> None:

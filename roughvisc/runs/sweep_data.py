@@ -101,14 +101,29 @@ def read_entry(path: Path) -> Entry:
     InputError
         If the file cannot be read, is not a result, or is damaged.
     """
-    stamp, arrays, fields = _stamp(path), {}, {}
     with open_result(path) as result:
-        lines = (axis_of(result.variables),), ("x",), ("y",)
-        for name, variable in result.variables.items():
-            if variable.dims in lines:
-                arrays[str(name)] = variable.values
-            elif variable.dims[-2:] == ("x", "y"):
-                fields[str(name)] = variable.dtype.str
+        return entry_of(path, result)
+
+
+def entry_of(path: Path, result: xr.Dataset) -> Entry:
+    """Return the entry of a result that was opened, or that was just written (:func:`as_stored`).
+
+    Parameters
+    ----------
+    path : Path
+        Its file.
+    result : xarray.Dataset
+        Its content.
+    """
+    stamp = _stamp(path)
+    lines = (axis_of(result.variables),), ("x",), ("y",)
+    arrays = {}
+    fields = {}
+    for name, variable in result.variables.items():
+        if variable.dims in lines:
+            arrays[str(name)] = variable.values
+        elif variable.dims[-2:] == ("x", "y"):
+            fields[str(name)] = variable.dtype.str
     of_height = _plain(result["height"].attrs) if "height" in result else {}
     return Entry(path.name, stamp, _plain(result.attrs), of_height, fields, arrays)
 

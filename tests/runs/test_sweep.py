@@ -16,6 +16,7 @@ from support import BALL, LONG, assert_same, numbers, refused
 
 from roughvisc.cli.studies import connect
 from roughvisc.errors import InputError, RoughviscError, TooLargeError
+from roughvisc.runs import cluster as cluster_module
 from roughvisc.runs import run as run_module
 from roughvisc.runs import sweep as sweep_module
 from roughvisc.runs.csv_files import CASES
@@ -111,13 +112,13 @@ POISON = '[sweep]\n"program.0.load" = ["4 mN", "50 N", "5 mN", 5e-3]\n'
 def test_sweep__a_failing_case_stops_nothing_and_is_not_tried_again(study, tmp_path, monkeypatch, caplog):
     cases = study(BALL + POISON)
     computed = []
-    bring = run_module.run_case
+    compute = run_module.compute
 
-    def counted(case, folder, **settings):
+    def counted(case, *keeper, **settings):
         computed.append(case.varied["program.0.load"])
-        return bring(case, folder, **settings)
+        return compute(case, *keeper, **settings)
 
-    monkeypatch.setattr(run_module, "run_case", counted)
+    monkeypatch.setattr(run_module, "compute", counted)
     ds = sweep(cases, tmp_path / "out", workers=0, progress=False)
     assert computed == [4e-3, 50.0, 5e-3], "those alike are computed once"
     assert list(ds["program_0_load"]) == [4e-3, 5e-3]
@@ -139,7 +140,7 @@ def test_sweep__an_error_of_the_program_is_kept_with_its_traceback(study, tmp_pa
     def broken(case, folder, **settings):
         return 1 / 0
 
-    monkeypatch.setattr(run_module, "run_case", broken)
+    monkeypatch.setattr(run_module, "compute", broken)
     with pytest.raises(RoughviscError, match="none of 4 cases could be finished; the first: ZeroDivisionError"):
         sweep(cases, tmp_path / "out", workers=0, progress=False)
     record = json.loads(case_path(tmp_path / "out", cases[0].key, "failure").read_text())
@@ -159,7 +160,7 @@ def test_sweep__what_was_in_the_way_is_tried_again(study, tmp_path, monkeypatch,
     def hindered(case, folder, **settings):
         raise error
 
-    monkeypatch.setattr(run_module, "run_case", hindered)
+    monkeypatch.setattr(run_module, "compute", hindered)
     outcomes = run_cases(cases, tmp_path / "out", display=Display(False), workers=0)
     assert {o.kind for o in outcomes.values()} == {"hindered"}
     assert not list((tmp_path / "out").glob("*.failed.json"))
@@ -170,20 +171,21 @@ def test_sweep__what_was_in_the_way_is_tried_again(study, tmp_path, monkeypatch,
 @pytest.mark.parametrize("workers", [0, 1])
 def test_sweep__ends_with_one_message_on_a_full_disk(study, tmp_path, monkeypatch, capfd, workers):
     """The second case finds no space: those after it are not begun, and the same command goes on."""
-    cases, bring = study(), run_module.run_case
+    cases = study()
+    compute = run_module.compute
 
-    def full(case, folder, **settings):
+    def full(case, *keeper, **settings):
         (tmp_path / f"begun-{len(list(tmp_path.glob('begun*')))}").touch()
         if len(list(tmp_path.glob("begun*"))) == 2:
             raise OSError(28, "No space left on device; make room", "x.nc")
         if len(list(tmp_path.glob("begun*"))) == 3:
             time.sleep(1)  # the sweep hears of the full disk before the fourth case could begin
-        return bring(case, folder, **settings)
+        return compute(case, *keeper, **settings)
 
     if workers:  # the processes of a local cluster are forked from one that has not seen this
         monkeypatch.setattr(sweep_module, "local_client", in_this_process)
-    monkeypatch.setattr(run_module, "run_case", full)
-    with pytest.raises(OSError, match=r"x\.nc: No space left .*make room \(1 of 4 cases are finished\)$") as caught:
+    monkeypatch.setattr(run_module, "compute", full)
+    with pytest.raises(OSError, match=r"\.nc: No space left .*make room .*\(1 of 4 cases are finished\)$") as caught:
         run_cases(cases, tmp_path / "out", display=Display(False), workers=workers)
     assert caught.value.errno == errno.ENOSPC
     begun = len(list(tmp_path.glob("begun*")))
@@ -196,20 +198,23 @@ def test_sweep__ends_with_one_message_on_a_full_disk(study, tmp_path, monkeypatc
 
 def test_sweep__computes_cases_of_much_memory_in_fewer_processes(study, tmp_path, monkeypatch):
     """A case fits if one process has all the memory, and not if four share it."""
-    cases, bring, processes = study(), run_module.run_case, []
+    cases = study()
+    compute = run_module.compute
+    processes = []
 
     def cluster(count):
         processes.append(count)
         return in_this_process(count)
 
-    def large(case, folder, **settings):
+    def large(case, *keeper, **settings):
         if case.varied["program.0.load"] == 5e-3 and processes[-1] > 1:
             raise TooLargeError("it needs more")
-        return bring(case, folder, **settings)
+        return compute(case, *keeper, **settings)
 
+    monkeypatch.setattr(sweep_module, "_START", 0.0)
     monkeypatch.setattr(sweep_module, "threads_each", lambda processes: 4 // processes)
     monkeypatch.setattr(sweep_module, "local_client", cluster)
-    monkeypatch.setattr(run_module, "run_case", large)
+    monkeypatch.setattr(run_module, "compute", large)
     outcomes = run_cases(cases, tmp_path / "out", display=Display(False))
     assert [outcome.kind for outcome in outcomes.values()] == ["done"] * 4
     assert processes == [4, 2, 1]
@@ -263,3 +268,32 @@ def test_sweep__refuses_what_makes_no_sense(study, tmp_path):
 
 # ----------------------------------------------------------------------------------------------------------------
 # what a user sees
+
+
+def test_sweep__that_ends_before_a_cluster_would_start_needs_none(study, tmp_path, monkeypatch):
+    monkeypatch.setattr(sweep_module, "threads_each", lambda processes: 4 // max(processes, 1))
+    monkeypatch.setattr(sweep_module, "local_client", None)
+    monkeypatch.setattr(sweep_module, "_START", 1e3)
+    outcomes = run_cases(study(), tmp_path / "out", display=Display(False))
+    assert [outcome.kind for outcome in outcomes.values()] == ["done"] * 4
+
+
+def test_sweep__goes_on_in_a_cluster_with_the_same_bits(study, tmp_path, monkeypatch):
+    """The first case is stopped at its first step, and a worker continues it from its checkpoint."""
+    cases = study()
+    monkeypatch.setattr(sweep_module, "threads_each", lambda processes: 2)
+    monkeypatch.setattr(sweep_module, "local_client", in_this_process)
+    monkeypatch.setattr(sweep_module, "_START", 0.0)
+    found = sweep(cases, tmp_path / "out", progress=False)
+    assert "resumes after" in (tmp_path / "out" / "sweep.log").read_text()
+    wanted = sweep(cases, tmp_path / "calm", workers=0, progress=False)
+    names = [name for name in wanted.data_vars if name != "wall_time"]
+    xr.testing.assert_identical(found[names].drop_attrs(), wanted[names].drop_attrs())
+
+
+def test_sweep__of_more_cases_than_a_window(study, tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster_module, "_WINDOW", 1)
+    monkeypatch.setattr(cluster_module, "_CASES_AHEAD", 1)
+    monkeypatch.setattr(sweep_module, "local_client", in_this_process)
+    outcomes = run_cases(study(), tmp_path / "out", display=Display(False), workers=1)
+    assert [outcome.kind for outcome in outcomes.values()] == ["done"] * 4

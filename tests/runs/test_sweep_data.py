@@ -12,8 +12,9 @@ from support import BALL, FRICTION, LOADS, ROUGH, refused
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.runs.netcdf import open_result, write_result
+from roughvisc.runs.run import attempt
 from roughvisc.runs.sweep import sweep
-from roughvisc.runs.sweep_data import INDEX, SWEEP
+from roughvisc.runs.sweep_data import INDEX, SWEEP, read_entry
 from roughvisc.study.case import vary
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "tolerance = 1e-2\n[keep]")
@@ -133,6 +134,20 @@ def test_open_results__on_different_grids_has_histories(study, tmp_path, caplog)
     assert not {"x", "y", "pressure", "height"} & set(ds.variables)
     assert "12 x 9 cells" in caplog.text
     assert "16 x 12 cells" in caplog.text
+
+
+@pytest.mark.parametrize("text", [BALL, FRICTION])
+def test_entry__of_a_computed_result_is_that_of_its_file(study, tmp_path, text):
+    (case,) = study(text)
+    outcome = attempt(case, tmp_path, progress=lambda *_: None)
+    entry = read_entry(tmp_path / f"{case.key}.nc")
+    assert outcome.entry.key == case.key
+    for name in ("file", "stamp", "attributes", "of_height", "fields"):
+        assert getattr(outcome.entry, name) == getattr(entry, name), name
+    assert outcome.entry.arrays.keys() == entry.arrays.keys()
+    for name, values in entry.arrays.items():
+        assert outcome.entry.arrays[name].dtype == values.dtype, name
+        np.testing.assert_array_equal(outcome.entry.arrays[name], values)
 
 
 def test_numbers__of_cases_are_those_of_the_study_if_one_is_missing(study, tmp_path):
