@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import sys
 from base64 import b64decode, b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -34,7 +35,7 @@ from roughvisc.runs.folder import (
     read_json,
     write_json,
 )
-from roughvisc.runs.netcdf import lazy, open_result, read_variable
+from roughvisc.runs.netcdf import lazy, open_result, open_without_steps, read_variable
 from roughvisc.study.case import Case, identifier, labels_of, parameters_of
 from roughvisc.study.sweep_table import DRAWN, REALISATION
 from roughvisc.variables import AXES, ROW, ROWS, VARIABLES, axis_of
@@ -50,6 +51,8 @@ SWEEP = ".cases.json.gz"
 CASE_KEY = "case_key"
 #: Size of a block, which is read in one call: several frames of a small grid, one frame of a large grid. [byte]
 _BLOCK = 16 << 20
+#: Number of results from which a client reads them, and number for a task; reading one takes about 10 ms.
+_MANY, _TOGETHER = 200, 50
 
 
 @dataclass(frozen=True)
@@ -101,7 +104,7 @@ def read_entry(path: Path) -> Entry:
     InputError
         If the file cannot be read, is not a result, or is damaged.
     """
-    with open_result(path) as result:
+    with open_without_steps(path) as result:
         return entry_of(path, result)
 
 
@@ -155,7 +158,9 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
     cached = _read_cache(folder)
     before = cached | {entry.file: entry for entry in known}
     entries = {}
-    for path in sorted(folder.glob(f"{KEY}.nc")):
+    paths = sorted(folder.glob(f"{KEY}.nc"))
+    before |= _read_on_workers([path for path in paths if path.name not in before])
+    for path in paths:
         try:
             entry = before.get(path.name)
             if entry is None or entry.stamp != _stamp(path):
@@ -170,6 +175,31 @@ def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
             [one.file, one.stamp, one.attributes, one.of_height, one.fields, one.arrays] for one in entries.values()
         ]
         write_json(folder / INDEX, {"version": program_version(), "results": results}, _packed)
+    return entries
+
+
+def _read_on_workers(paths: Sequence[Path]) -> dict[str, Entry]:
+    """Return the entries of many results by file name, read on the workers of the default client; none without one.
+
+    A result that a worker cannot read is left out.
+    """
+    distributed = sys.modules.get("distributed")
+    if len(paths) < _MANY or distributed is None:
+        return {}
+    try:
+        client = distributed.default_client()
+        parts = [paths[first : first + _TOGETHER] for first in range(0, len(paths), _TOGETHER)]
+        entries = client.gather(client.map(_readable_entries, parts, pure=False))
+    except (ValueError, OSError, RuntimeError):  # no client, or its cluster is lost
+        return {}
+    return {entry.file: entry for part in entries for entry in part}
+
+
+def _readable_entries(paths: Sequence[Path]) -> list[Entry]:
+    entries = []
+    for path in paths:
+        with suppress(InputError, FileNotFoundError):
+            entries.append(read_entry(path))
     return entries
 
 

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import threading
 from functools import partial
 
 import numpy as np
@@ -11,10 +12,11 @@ from support import BALL, FRICTION, LOADS, ROUGH, refused
 
 import roughvisc as rv
 from roughvisc.errors import InputError
+from roughvisc.runs import sweep_data
 from roughvisc.runs.netcdf import open_result, write_result
 from roughvisc.runs.run import attempt
 from roughvisc.runs.sweep import sweep
-from roughvisc.runs.sweep_data import INDEX, SWEEP, read_entry
+from roughvisc.runs.sweep_data import INDEX, SWEEP, index_of, read_entry
 from roughvisc.study.case import vary
 
 SMALL = BALL.replace("[24, 21]", "[12, 9]").replace("[keep]", "tolerance = 1e-2\n[keep]")
@@ -310,3 +312,23 @@ def test_open_results__nothing_there(tmp_path):
         rv.open_results(tmp_path)
     with pytest.raises(InputError, match="does not exist: expected a folder with results"):
         rv.open_results(tmp_path / "gone")
+
+
+def test_open_results__a_client_reads_many_results(sixty, tmp_path, monkeypatch):
+    """The workers make the index with the same entries; this process reads only a file that they cannot."""
+    from distributed import Client
+
+    folder = shutil.copytree(sixty, tmp_path / "out", ignore=shutil.ignore_patterns(INDEX))
+    wanted = index_of(sixty)
+    monkeypatch.setattr(sweep_data, "_MANY", 60)
+    with Client(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None):
+        read_by = []
+        read = sweep_data.read_entry
+        monkeypatch.setattr(
+            sweep_data, "read_entry", lambda path: read_by.append(threading.current_thread()) or read(path)
+        )
+        found = index_of(folder)
+    assert found.keys() == wanted.keys()
+    assert all(found[key].attributes == wanted[key].attributes for key in wanted)
+    assert len(read_by) == 60
+    assert threading.main_thread() not in read_by
