@@ -93,13 +93,13 @@ def grid_error_of(results: Iterable[Mapping[Any, Any]]) -> str:
     Examples
     --------
     >>> grid_error_of([{"grid_error": [0.709, 0.02]}]), grid_error_of([{"force": [1.0]}])
-    ('0.71 of the pressure', 'not estimated (grid_error = true in [solve])')
+    ('71 % of the pressure', 'not estimated (grid_error = true in [solve])')
     """
     found = list(results)
     for quantity, name in (("pressure", GRID_ERROR["pressure"]), ("friction", GRID_ERROR["friction_force"])):
         if errors := [np.ravel(one[name]) for one in found if np.size(one.get(name, ()))]:
             largest = np.fmax.reduce(np.concatenate(errors))
-            return "not known" if math.isnan(largest) else f"{largest:.2g} of the {quantity}"
+            return "not known" if math.isnan(largest) else f"{100 * largest:.2g} % of the {quantity}"
     return "not estimated (grid_error = true in [solve])"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -9,6 +10,7 @@ from importlib.util import find_spec
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
+from rich.table import Column
 from rich.text import Text
 
 from roughvisc.errors import printable
@@ -32,12 +34,15 @@ class Bars(Progress):
         console = console or Console(stderr=True)
         draws = find_spec("ipywidgets") if console.is_jupyter else console.is_terminal and not console.is_dumb_terminal
         super().__init__(
-            TextColumn("{task.description}", markup=False),
-            BarColumn(20),
+            TextColumn(
+                "{task.description}", markup=False, table_column=Column(ratio=1, no_wrap=True, overflow="ellipsis")
+            ),
+            BarColumn(12),
             TextColumn("{task.fields[at]}", markup=False),
             TimeRemainingColumn(compact=True),
             console=console,
             transient=True,
+            expand=True,
             disable=console.quiet or not draws,
             speed_estimate_period=_RECENT,
         )
@@ -90,6 +95,29 @@ def reporting(
             bars.line(label)
 
         yield report
+
+
+@contextmanager
+def sign_of_life(what: str) -> Iterator[None]:
+    """Show on a terminal, from one second on, that a computation without a known length is running.
+
+    Parameters
+    ----------
+    what : str
+        What it does, as in ``"reads the scan"``.
+    """
+    status = Console(stderr=True).status(f"{what} ...")
+    timer = threading.Timer(1.0, status.start)
+    timer.daemon = True
+    if status.console.is_terminal:
+        timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        if timer.is_alive():
+            timer.join()
+        status.stop()
 
 
 def clock(seconds: float) -> str:

@@ -33,7 +33,7 @@ else:
 _Taking = TypeVar("_Taking", bound=Callable[..., Any])
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_FACTOR = r"[^\W\d_]+(?:_[^\W\d_]+)*(?:\s*(?:\^|\*\*)\s*[+-]?\d(?:\.\d)?|[²³])?"
+_FACTOR = r"[^\W\d_]+(?:_[^\W\d_]+)*(?:\s*(?:\^|\*\*)\s*[+-]?\d(?:\.\d)?|[²³]|-?[1-4])?"
 # A grammar in front of pint: pint evaluates arithmetic, and "9**9**9**9 m" would not end.
 _PRODUCT = rf"{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*"
 # in "0.31/MPa" the number is 0.31: the 1 of an inverse unit has to be separated by a blank
@@ -288,7 +288,7 @@ def _parsed(text: str, unit: str, difference: bool) -> float:
 
     registry = get_application_registry()
     try:
-        known = "percent" if found == "%" else found.replace("·", "*")
+        known = "percent" if found == "%" else _written_powers(found.replace("·", "*"))
         names = registry.parse_units_as_container(f"1{known}" if known.startswith("/") else known)
         given, expected = registry.Unit(names), registry.Unit("" if dimensionless else unit)
         if given.dimensionality != expected.dimensionality or (dimensionless and not _ANGLES.isdisjoint(names)):
@@ -300,6 +300,11 @@ def _parsed(text: str, unit: str, difference: bool) -> float:
     if difference and begins:
         raise ValueError(f"a temperature and not a difference of temperatures (such as {f'{value:g} K'!r})")
     return float(f"{converted:.15g}")
+
+
+def _written_powers(unit: str) -> str:
+    """Return a unit with the sign of each power: ``N/mm2`` is ``N/mm^2``."""
+    return re.sub(r"(?<=[^\W\d_])(?=-?\d)", "^", unit)
 
 
 def _prefixed(number: str, found: str, unit: str) -> float | None:

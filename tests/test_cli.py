@@ -48,7 +48,7 @@ def test_run__writes_result_and_figures_and_sums_up(invoke, tmp_path, coarse_pic
     found = [shown["Grid"], shown["Force at the end"], shown["Contact area at the end"].partition(";")[0]]
     assert found == ["24 x 21 cells, free boundary", "0 N", "0 m²"]
     with rv.open_result(result) as ds:
-        assert shown["Accuracy: worst grid error"] == f"{float(ds.grid_error.max()):.2g} of the pressure"
+        assert shown["Accuracy: worst grid error"] == f"{100 * float(ds.grid_error.max()):.2g} % of the pressure"
         assert shown["Largest contact area"] == f"{1e6 * float(ds.contact_area[1]):.3g} mm² at t = 100 ms"
     before = result.stat().st_mtime_ns
     assert "nothing to compute" in invoke("run", study, "--no-plots")[1]
@@ -292,7 +292,7 @@ def test_scan__lists_channels_and_asks_for_what_a_file_does_not_state(invoke, tm
     np.save(tmp_path / "plain.npy", z[0])
     for given, missing in (([], "unit"), (["--spacing", "1um"], "unit"), (["--unit", "m"], "spacing")):
         status, _, err = invoke("scan", "plain.npy", *given)
-        assert (status, f"expected {missing} = " in err) == (2, True)
+        assert (status, f"expected --{missing} " in err) == (2, True)
     assert "expected unit = " in invoke("run", write_study(BALL, (SPHERE, 'file = "plain.npy"\n')))[2], "a key"
     assert invoke("scan", "plain.npy", "--unit", "m", "--spacing", "1um", "--card", "plain.toml")[0] == 0
     assert rv.open_scan(tmp_path / "plain.toml").shape == (30, 20)
@@ -316,7 +316,7 @@ def test_new__asks_a_person_for_what_a_file_does_not_state_and_keeps_the_answers
     (tmp_path / "plain-study.toml").unlink()
     closed = ["sh", "-c", 'exec "$@" <&-', "sh", *command]  # a closed stream is None
     alone = subprocess.run(closed, cwd=tmp_path, capture_output=True, text=True)
-    assert (alone.returncode, alone.stderr.count("\n"), "expected unit" in alone.stderr) == (2, 1, True)
+    assert (alone.returncode, alone.stderr.count("\n"), "expected --unit" in alone.stderr) == (2, 1, True)
 
 
 @pytest.mark.thorough

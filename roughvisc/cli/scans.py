@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -69,9 +71,19 @@ def _opened(file: Path, options: dict[str, Any]) -> xr.DataArray:
             lacks = error.key in _QUESTIONS and options[error.key] is None
             # a closed stream is None
             if not (lacks and all(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stderr))):
-                raise
+                raise InputError(_by_options(str(error), options), key=error.key) from error
             question, kind = _QUESTIONS[error.key]
             options[error.key] = click.prompt(f"{file}: {question}", type=kind, err=True)
+
+
+def _by_options(message: str, options: Iterable[str]) -> str:
+    """Return a message in which arguments of a file are options of the command: ``unit = "um"`` is ``--unit um``."""
+    names = "|".join(options)
+    return re.sub(
+        rf'\b({names}) = ("[^"]+"|[^",\s]+)',
+        lambda stated: f"--{stated[1].replace('_', '-')} {shell_word(stated[2].strip('"'))}",
+        message,
+    )
 
 
 @click.command()
@@ -94,6 +106,7 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, **op
     """
     from roughvisc.cli.summaries import findings_table, scan_table
     from roughvisc.plot.save import is_made_by, write_figure
+    from roughvisc.progress import sign_of_life
     from roughvisc.runs.folder import atomic_write, write_text
     from roughvisc.topography.scans import card_text, known_suffix, surface_table
 
@@ -105,10 +118,13 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, **op
     for out in filter(None, (plot, to, card)):
         if out.exists() and not (out is plot and is_replaced):
             raise InputError(f"{out}: already exists: expected another name")
-    levelled, found = rv.level(height), rv.inspect(height)
+    with sign_of_life("inspects the scan"):
+        levelled = rv.level(height)
+        found = rv.inspect(height)
+        measures = rv.parameters(levelled)
     text = card_text(file, card.parent, options, found.steps) if card else ""
     console = screen()
-    console.print(scan_table(height, rv.parameters(levelled), file.name), "", findings_table(found), "", sep="\n")
+    console.print(scan_table(height, measures, file.name), "", findings_table(found), "", sep="\n")
     say(console, surface_table(file, Path(), options, found.steps))
     if is_replaced or not picture.exists():
         say_path(console, "Picture", write_figure(rv.plot.surface(levelled), picture, _MAKER))
@@ -142,6 +158,7 @@ def new(file: Path | None, out: Path | None, contact: str, **options: Any) -> No
       roughvisc new focus_variation.x3p --contact "20 %" --out other.toml
     """
     from roughvisc.cli.summaries import findings_table
+    from roughvisc.progress import sign_of_life
     from roughvisc.runs.folder import atomic_write, write_text
     from roughvisc.study.first_study import first_pressure, starter_study
     from roughvisc.topography import EXAMPLE
@@ -159,8 +176,9 @@ def new(file: Path | None, out: Path | None, contact: str, **options: Any) -> No
         with atomic_write(source) as temporary:
             temporary.write_bytes(shipped)
     height = _opened(source, options)
-    found = rv.inspect(height)
-    first = first_pressure(height, found, part)
+    with sign_of_life("inspects the scan"):
+        found = rv.inspect(height)
+        first = first_pressure(height, found, part)
     write_text(out, starter_study(source, out, options, found, first))
     if first.miss:
         complain(f"warning: {first.miss}")

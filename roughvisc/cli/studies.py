@@ -44,8 +44,10 @@ def plan(study: Path, out: Path | None, workers: int | None) -> None:
       roughvisc plan focus_variation-study.toml
     """
     from roughvisc.cli.study_tables import plan_tables
+    from roughvisc.progress import sign_of_life
 
-    costs = rv.plan(study, out, workers=workers)
+    with sign_of_life("runs the study on few cells"):
+        costs = rv.plan(study, out, workers=workers)
     if not costs["refusal"].all():
         screen().print(plan_tables(costs))
     if why := costs.attrs["refusal"].removeprefix(f"{study}: "):

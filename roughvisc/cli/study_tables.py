@@ -122,6 +122,10 @@ def trade_table(dataset: xr.Dataset, quantity: str, target: float) -> Group:
         if chosen is None
         else f"For an error of {wanted} of the {words} use {dataset['setting'].values[chosen]}.",
     ]
+    if dataset.attrs["grid_is_data"]:
+        lines.append(
+            f"The {wanted} do not contain the error from the spacing, {by_grid} %: a scan with closer points has less."
+        )
     return titled(dataset.attrs["title"], columns(headings, rows, ("setting",)), *map(Text, lines))
 
 

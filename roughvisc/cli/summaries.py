@@ -57,11 +57,42 @@ def readable(value: float, unit: str) -> str:
     return "not known" if math.isnan(value) else unit_for(value, unit).text(value)
 
 
+def errors_in_words(row: xr.Dataset, name: str) -> str:
+    """Return the errors of a quantity relative to its value, as ``" (numerical 0.013 %, grid 2.5 %)"``.
+
+    Errors that are not known are left out. The error of a value of zero stands with its unit.
+
+    Parameters
+    ----------
+    row : xarray.Dataset
+        One row of a result.
+    name : str
+        Name of the quantity.
+    """
+    name = "contact_area" if name == "contact_fraction" else name  # which have equal relative errors
+    value = abs(float(row[name]))
+    parts = []
+    for error in filter(row.__contains__, ERRORS[name]):
+        size = float(row[error])
+        if error != f"{name}_error":
+            parts.append(f"grid {percent(size)}")
+        else:
+            text = percent(size / value) if value > 0 else readable(size, VARIABLES[error].units)
+            parts.append(f"numerical {text}")
+    parts = [text for text in parts if "nan" not in text and "not known" not in text]
+    return f" ({', '.join(parts)})" if parts else ""
+
+
+def percent(part: float) -> str:
+    """Return a part with two digits: ``percent(1.3e-4)`` is ``"0.013 %"``."""
+    return f"{100 * part:.2g} %" if part == 0 or part >= 1e-7 else "< 0.00001 %"
+
+
 def worst_error(found: Iterable[Any]) -> str:
     """Return the largest known stated error of some results as text."""
     errors = np.concatenate([[-np.inf], *(np.ravel(one["stated_error"]) for one in found if "stated_error" in one)])
     largest = np.max(errors, where=np.isfinite(errors), initial=-np.inf)
-    return f"{largest:.2g}" if largest >= 0 else "not known"
+    return percent(largest) if largest >= 0 else "not known"
 
 
 def result_table(dataset: xr.Dataset) -> Group:
@@ -75,10 +106,7 @@ def result_table(dataset: xr.Dataset) -> Group:
     ]
     for name in IN_TABLE:
         if name in row and name != axis.name:
-            text = readable(float(row[name]), VARIABLES[name].units)
-            for error in filter(row.__contains__, ERRORS[name]):
-                kind = "numerical" if error == f"{name}_error" else "grid"
-                text += f"; {kind} error {readable(float(row[error]), VARIABLES[error].units)}"
+            text = readable(float(row[name]), VARIABLES[name].units) + errors_in_words(row, name)
             rows.append((f"{VARIABLES[name].label} {where}", text))
         if name == "contact_area" and name in row and not axis.telling:
             most = dataset.isel({axis.name: int(np.argmax(dataset[name].values))})
@@ -87,7 +115,7 @@ def result_table(dataset: xr.Dataset) -> Group:
                 rows.append((f"Largest {VARIABLES[name].label.lower()}", f"{text} at {place}"))
     seconds, convolutions = cost_of(dataset)
     tolerance = dataset.attrs.get("tolerance", math.nan)
-    rows.append(("Accuracy: worst stated error", f"{worst_error([dataset])}, tolerance {tolerance:g}"))
+    rows.append(("Accuracy: worst stated error", f"{worst_error([dataset])}, tolerance {percent(tolerance)}"))
     rows.append(("Accuracy: worst grid error", grid_error_of([dataset])))
     rows.append(("Cost: convolutions", f"{convolutions:.0f}"))
     rows.append(("Cost: wall time", readable(seconds, "s")))

@@ -26,7 +26,7 @@ from scipy.special import erf, erfinv
 
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.experiment.base import Rows
-from roughvisc.experiment.loading import LoadingRows
+from roughvisc.experiment.loading import Loading, LoadingRows
 from roughvisc.experiment.memory_limit import (
     PART,
     PROCESS,
@@ -69,6 +69,8 @@ _FIRST_STEP = 0.005
 _ITERATIONS = 3
 #: Time for the coarse runs of a sweep: this time, or this part of the expected time of all cases. [s, 1]
 _BUDGET, _SHARE = 1.2, 0.05
+#: Contact fraction above which a number in a wrong unit is likely.
+_MOST_CONTACT = 0.9
 #: Time of the rest of a step, and of each exponential in a step, over the time of a convolution. Time per convolution
 #: of a friction curve over the time of a convolution of a contact problem, at 256 and 1024 cells a side.
 _STEP, _EXPONENTIAL, _CURVE_CONVOLUTION = 2.0, 0.4, 2.1
@@ -102,10 +104,10 @@ def plan(
         ``model``: boundary, memory of the material, and the part of the surface that is solved on. ``steps``, or
         speeds of a friction curve; ``rows``, the kept ones; ``convolutions``, of one forward and one inverse transform
         each; ``wall_time`` in one process with one thread [s]; ``memory`` of the process at its peak and ``disk``, the
-        size of the result [byte]; the largest ``contact_fraction`` and ``nominal_pressure`` [Pa], if the case had a
-        coarse run. ``marched``: whether it had, or the numbers are from the nearest case. ``note``: how a measured
-        history became segments, and times that are left out. ``warning``: expected contact at the border, which ends a
-        run. ``refusal``: why it cannot run.
+        size of the result [byte]; the largest ``contact_fraction`` and ``nominal_pressure`` [Pa], NaN without a
+        coarse run for an approach, an indenter or a friction curve. ``marched``: whether it had a coarse run, or the
+        numbers are from the nearest case. ``note``: how a measured history became segments, and times that are left
+        out. ``warning``: expected contact at the border, which ends a run. ``refusal``: why it cannot run.
         Attributes: the number of parallel ``processes`` and the ``threads`` of each, the total ``wall_time`` with one
         thread each [s], ``memory`` of all processes [byte], ``disk`` [byte], the free memory and disk, and
         ``refusal``, empty if all cases can run.
@@ -151,7 +153,7 @@ def plan(
             nearest = min(runs, key=lambda other: abs(other - number))
             row |= _costs(case, own, runs[nearest], seconds, there)
             if not is_own:
-                row |= {"contact_fraction": np.nan, "nominal_pressure": np.nan}
+                row |= _scaled_from(runs[nearest], cases[nearest], case, own)
         except (InputError, ConvergenceError) as error:
             row["refusal"] = str(error)
         rows[number] = row
@@ -265,6 +267,30 @@ def coarse_run(own: Rows, case: Case) -> CoarseRun:
     touched = scaled_contact(largest, rms_slope(few) / slope) if slope > 0 else largest
     scaled = np.array([*contact, largest]) * (touched / largest if largest > 0 else 1.0)
     return CoarseRun(steps, work, kept_part, scaled, force, work * seconds + dearer * beyond, height.size)
+
+
+def _scaled_from(run: CoarseRun, done: Case, case: Case, own: Rows) -> dict[str, float]:
+    """Return contact fraction and nominal pressure of a case without a coarse run; NaN if they are not known.
+
+    Parameters
+    ----------
+    run, done : CoarseRun, Case
+        Coarse run of the nearest case, and this case.
+    case : Case
+        The case.
+    own : Rows
+        Its rows, not computed.
+    """
+    load = own.scene.program.largest_load if isinstance(own, LoadingRows) else 0.0
+    if not (load > 0 and run.force > 0) or own.problem.settings.boundary == "free":
+        return {"contact_fraction": np.nan, "nominal_pressure": np.nan}  # an approach, a friction curve, an indenter
+    compliances = [
+        float(one.body.material.contact_compliance(one.experiment.program.duration))
+        for one in (case, done)
+        if isinstance(one.experiment, Loading)
+    ]
+    ratio = load * compliances[0] / (run.force * compliances[-1])
+    return {"contact_fraction": scaled_contact(float(run.contact[-1]), ratio), "nominal_pressure": load / own.area}
 
 
 def scaled_contact(fraction: float, times: float) -> float:
@@ -398,6 +424,8 @@ def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Availab
             "Contact is expected to reach the border of the free-space domain, which ends a run: use boundary = "
             "'periodic' for a nominally flat scan, a larger surface, a smaller load, or edge = 'accept'."
         )
+    if fraction > _MOST_CONTACT:
+        warning = warning or "More than 90 % of the surface is expected to touch: check the units of modulus and load."
     return {
         "model": model,
         "cells_x": whole.shape[0],

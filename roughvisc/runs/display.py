@@ -15,6 +15,8 @@ from roughvisc.runs.run import Outcome
 from roughvisc.study.case import Case
 from roughvisc.study.case_text import value_text
 
+#: Longest text of the varied values of a case.
+_LONGEST = 60
 #: Time between two moves of the bars by running cases. [s]
 _MOVE_EVERY = 0.1
 
@@ -45,8 +47,8 @@ class Display:
     def begin(self, cases: Sequence[Case], numbers: Mapping[str, int]) -> None:
         """Show the cases, in the order of the study; `numbers` gives the number of each key."""
         for case in cases:
-            varied = ", ".join(f"{name} = {value_text(name, x)}" for name, x in case.varied.items())
-            self._names[case.key] = f"case {numbers[case.key]}" + (f" ({varied[:60]})" if varied else "")
+            varied = ", ".join(value_text(name, value) for name, value in case.varied.items())
+            self._names[case.key] = f"case {numbers[case.key]}" + (f" ({varied[:_LONGEST]})" if varied else "")
             self._at[case.key] = case.experiment.progress
         self._bars.start()
         with self._lock:

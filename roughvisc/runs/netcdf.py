@@ -61,8 +61,10 @@ class DamagedError(InputError):
 def unreadable(path: Path, error: Exception, what: str = "") -> InputError:
     """Return the error of a file that the library could not read: a system error, or damaged content."""
     try:
-        with path.open("rb"):  # the library reports some causes, such as too many open files, as damage
+        with path.open("rb") as file:  # the library reports some causes, such as too many open files, as damage
             cause = cause_of_system(error)
+            if not cause and path.suffix != ".nc" and not file.read(4).startswith((b"\x89HDF", b"CDF")):
+                cause = "is not a NetCDF file"
     except OSError as failure:
         cause = cause_of_system(failure)
     if cause:

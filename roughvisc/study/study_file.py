@@ -5,6 +5,7 @@ A table contains the arguments of one function, which checks them; see :mod:`rou
 
 from __future__ import annotations
 
+import logging
 import re
 import sys
 from collections.abc import Callable, Mapping
@@ -41,6 +42,8 @@ from roughvisc.topography.recipes import RECIPES
 from roughvisc.topography.scans import check_surface, open_scan, surface_boundary
 from roughvisc.units import number
 
+log = logging.getLogger("roughvisc")
+
 #: Tables of a study, without its sweep.
 TABLES = ("title", "surface", "material", "program", "friction", "solve", "keep", "observe", "audit")
 #: Keys of a temperature, which every model has, and of a body that is not a half-space.
@@ -59,6 +62,8 @@ _KEYS_OF = {table: [name for name, one in TABLE_OF.items() if one == table] for 
 _NEEDS = {"leakage": ("gap",), "conductance": ("pressure", "gap")}
 #: Largest number of speeds of ``from``, ``to`` and ``count``.
 _MOST_SPEEDS = 1000
+#: Modulus below which a number without a unit is probably one in MPa. [Pa]
+_SOFTEST = 100.0
 #: Largest excess of a kept time over the end of a program, relative to the duration.
 _ROUNDING = 1e-12
 
@@ -123,7 +128,7 @@ def in_si(value: Any, key: str, tables: Mapping[str, Any], folder: Path | None =
         for name, part in parts.items():
             parts[name] = in_si(part, f"{key}.{name}" if key else name, tables, folder)
         return parts if isinstance(value, Mapping) else list(parts.values())
-    if isinstance(value, float | bool) or value is None:
+    if isinstance(value, bool) or value is None:
         return value
     unit = unit_of(key, tables)
     if unit and isinstance(value, str):
@@ -132,7 +137,9 @@ def in_si(value: Any, key: str, tables: Mapping[str, Any], folder: Path | None =
     if isinstance(value, int):
         if abs(value) > sys.float_info.max:
             raise InputError(key=key, found=value, expected="a number with fewer digits")
-        return float(value) if unit not in ("", "1") else value
+        value = float(value) if unit not in ("", "1") else value
+    if folder and unit == "Pa" and key.startswith("material.") and isinstance(value, float) and 0 < value < _SOFTEST:
+        log.warning('%s = %g is %g Pa, softer than any gel: write the unit, as in "%g MPa"', key, value, value, value)
     return value
 
 

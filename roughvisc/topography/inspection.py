@@ -15,6 +15,7 @@ from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.filters import fill, gaussian_filter, in_large_holes, level, mask_outliers
 from roughvisc.topography.framing import crop
 from roughvisc.topography.grid import checked, nominal_area, rms_slope, spacing
+from roughvisc.topography.scans import written_quantity
 from roughvisc.topography.spectrum import psd
 from roughvisc.units import unit_for
 
@@ -151,7 +152,7 @@ def inspect(h: xr.DataArray) -> Inspection:
     repeats = max(border_mismatch(kept)) > JUMP >= max(border_mismatch(h))  # a plane would break the periodicity
     order = 2 if form > _FORM else int(not repeats and np.nanstd(plane.values) > _TILTED * rms)
     treated = (level(h, order) if order else h).where(kept.notnull())
-    along_x, along_y = (f"{math.degrees(math.atan(abs(one))):.3f}°" for one in slopes)
+    along_x, along_y = (f"{math.degrees(math.atan(abs(one))):.2g}°" for one in slopes)
     seen = f"{along_x} along x, {along_y} along y; a quadratic form accounts for {_percent(form)} of Sq squared"
     with_form = 'level = 2 for the roughness alone; level = 1 and boundary = "free" for contact with the form'
     advice = ("", "level = 1 subtracts the plane", with_form)[order]
@@ -161,7 +162,7 @@ def inspect(h: xr.DataArray) -> Inspection:
     treated = fill(treated) if treated.isnull().any() else treated
     borders = border_mismatch(treated)
     boundary: Literal["periodic", "mirror"] = "mirror" if max(borders) > JUMP else "periodic"
-    seen = f"opposite borders differ {borders[0]:.2f} (x) and {borders[1]:.2f} times (y) as much as neighbouring rows"
+    seen = f"opposite borders differ {borders[0]:.2g} (x) and {borders[1]:.2g} times (y) as much as neighbouring rows"
     findings["Borders"] = Finding(seen, f'boundary = "{boundary}"', {}, {"of_neighbours": borders})
 
     findings["Noise"] = noise = _noise(treated)
@@ -258,7 +259,8 @@ def _noise(h: xr.DataArray) -> Finding:
     is_harmful = noisy > _HARMLESS and cutoff >= 3 * cell
     step = {"filter": max(float(f"{cutoff:.2g}"), _rounded_up(3 * cell))} if is_harmful else {}
     values = {"rms": noise, "floor": True, "wavelength": cutoff, "noisy_slopes": noisy}
-    return Finding(seen, "filter out these wavelengths" * is_harmful, step, values)
+    advice = f'filter = "{written_quantity(step["filter"], "m")}" takes out these wavelengths' if is_harmful else ""
+    return Finding(seen, advice, step, values)
 
 
 def _spectrum(h: xr.DataArray, gaps: np.ndarray) -> xr.Dataset:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import tomllib
 from collections.abc import Mapping
 from importlib import import_module
@@ -202,6 +203,10 @@ def measured_file(path: Path) -> Path | None:
     return None if named is None else Path(named)
 
 
+#: A line of TOML with a number and a unit without quotes: the key and the quantity.
+_UNQUOTED = re.compile(r'\s*([\w."-]+)\s*=\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?\s*[^\d\s",\]}#.][^",\]}#]*?)\s*(?:#.*)?')
+
+
 def read_toml(path: Path, wanted: str) -> dict[str, Any]:
     """Return the tables of a TOML file, with or without a byte-order mark.
 
@@ -214,7 +219,19 @@ def read_toml(path: Path, wanted: str) -> dict[str, Any]:
     try:
         return tomllib.loads(TextIOWrapper(BytesIO(content), "utf-8-sig").read())
     except (ValueError, RecursionError) as error:  # for example an integer of thousands of digits
-        raise InputError(f"{path}: is not {wanted}: {error}: expected TOML in UTF-8") from error
+        advice = _forgotten_quotes(content, str(error))
+        raise InputError(f"{path}: is not {wanted}: {error}: expected TOML in UTF-8{advice}") from error
+
+
+def _forgotten_quotes(content: bytes, message: str) -> str:
+    """Return the advice for a line of TOML that cannot be read because a quantity lacks its quotes; else empty."""
+    number = re.search(r"at line (\d+)", message)
+    lines = content.decode(errors="replace").splitlines()
+    if number and int(number[1]) <= len(lines):
+        stated = _UNQUOTED.fullmatch(lines[int(number[1]) - 1])
+        if stated:
+            return f'; quantities with a unit stand in quotes: {stated[1]} = "{stated[2]}"'
+    return ""
 
 
 def surface_height(table: Mapping[str, Any]) -> xr.DataArray:
@@ -311,14 +328,16 @@ def surface_table(file: _Path, folder: _Path, options: Mapping[str, Any], steps:
     file : path
         The scan, or a surface card.
     folder : path
-        Folder of the study or the card: the file is named relative to it.
+        Folder of the study or the card: the file is named relative to it, unless the whole path is shorter.
     options : mapping
         Options of :func:`roughvisc.open_scan` that the file needs; None for unused options.
     steps : mapping
         Conditioning steps, as for :func:`~roughvisc.topography.conditioning.condition`. [m]
     """
     given = {key: value for key, value in options.items() if value is not None}
-    return "[surface]\n" + _entries({"file": Path(os.path.relpath(file, folder)).as_posix(), **given, **steps})
+    relative = os.path.relpath(file, folder)
+    path = min(relative, os.path.abspath(file), key=len)  # many steps up are harder to read than the whole path
+    return "[surface]\n" + _entries({"file": Path(path).as_posix(), **given, **steps})
 
 
 def _entries(table: Mapping[str, Any]) -> str:

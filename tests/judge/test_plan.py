@@ -153,6 +153,17 @@ def test_copied_numbers__are_marked(study, monkeypatch, tmp_path, invoke):
     assert [path.name for path in tmp_path.iterdir()] == ["study.toml"], "nothing is written"
 
 
+def test_contact_fraction__of_a_case_without_a_coarse_run_follows_its_load(study, monkeypatch):
+    cases = [study(ROUGH, {"program.0.load": load}) for load in (0.05, 0.15)]
+    own = rv.plan(cases)
+    for name in ("_BUDGET", "_SHARE"):
+        monkeypatch.setattr(plan_module, name, 0.0)
+    planned = rv.plan(cases)
+    assert list(planned.marched.values) == [True, False]
+    np.testing.assert_allclose(planned.contact_fraction, own.contact_fraction, rtol=0.2)
+    np.testing.assert_allclose(planned.nominal_pressure, own.nominal_pressure, rtol=1e-9)
+
+
 def test_full_contact__is_foreseen(study):
     heavy = rv.plan([study(ROUGH, {"program.0.load": 2.0})]).isel(case=0)
     assert float(heavy.contact_fraction) > 0.95
