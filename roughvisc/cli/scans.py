@@ -80,8 +80,8 @@ def _by_options(message: str, options: Iterable[str]) -> str:
     """Return a message in which arguments of a file are options of the command: ``unit = "um"`` is ``--unit um``."""
     names = "|".join(options)
     return re.sub(
-        rf'\b({names}) = ("[^"]+"|[^",\s]+)',
-        lambda stated: f"--{stated[1].replace('_', '-')} {shell_word(stated[2].strip('"'))}",
+        rf'\b({names}) = (?:"([^"]+)"|([^",\s]+))',
+        lambda stated: f"--{stated[1].replace('_', '-')} {shell_word(stated[2] or stated[3])}",
         message,
     )
 

@@ -13,7 +13,7 @@ from support import BALL, refused, with_steps
 
 import roughvisc as rv
 from roughvisc.errors import InputError
-from roughvisc.runs.netcdf import DamagedError, verify, write_result
+from roughvisc.runs.netcdf import DamagedError, open_result, verify, write_result
 from roughvisc.runs.run import run_case
 from roughvisc.study.case import read_cases, read_study
 
@@ -206,3 +206,12 @@ def test_verify__names_what_is_damaged_and_changes_nothing(copied, sample, invok
     assert invoke("verify", out)[0] == 0
     shutil.rmtree(out)
     assert invoke("verify", out)[0] == 2
+
+
+def test_picture__is_not_a_damaged_result(tmp_path):
+    path = tmp_path / "maps.png"
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(100))
+    with pytest.raises(InputError) as error:
+        open_result(path)
+    assert not isinstance(error.value, DamagedError)
+    assert (error.value.key, error.value.found) == (str(path), "is not a NetCDF file")

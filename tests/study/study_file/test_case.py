@@ -252,3 +252,14 @@ def test_unit_of__other_keys_and_parts_of_values():
         key = f"program.0.{kind}.{name}"
         stated = [{"program": [{kind: {}} | control]} for control in ({}, {"control": "load"}, {"control": "approach"})]
         assert [unit_of(key), *(unit_of(key, case) for case in stated)] == ["", "N", "N", "m"]
+
+
+def test_study__of_a_quantity_without_quotes_shows_them(tmp_path):
+    path = tmp_path / "study.toml"
+    path.write_text('[surface]\nfile = "a.sur"\nfilter = 9.8 um  # noise\n')
+    with pytest.raises(rv.InputError, match='filter = "9.8 um"'):
+        rv.read_study(path)
+    path.write_text("[surface]\nsize = 3 4\n")
+    with pytest.raises(rv.InputError) as error:
+        rv.read_study(path)
+    assert "quotes" not in str(error.value)

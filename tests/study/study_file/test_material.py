@@ -153,3 +153,9 @@ def test_material__is_refused_at_the_key(read, tmp_path, table, key):
     (tmp_path / "bare.csv").write_text("time, compliance\n0, 1\n1, 2")
     with refused(key):
         read(material={name: value for name, value in table.items() if value is not None})
+
+
+@pytest.mark.parametrize(("modulus", "count"), [(3, 1), ("3 Pa", 0), (3e6, 0)])
+def test_number_without_a_unit__of_a_very_soft_body_warns(read, caplog, modulus, count):
+    read(material={"model": "elastic", "shear_modulus": modulus})
+    assert sum("material.shear_modulus" in record.getMessage() for record in caplog.records) == count
