@@ -59,7 +59,7 @@ def report(results: Path, out: Path | None) -> None:
 
 @click.command()
 @click.argument("results", type=PATH)
-@click.option("-o", "--out", type=PATH, help="CSV file to write. [default: table.csv in the folder, or RESULT.csv]")
+@click.option("-o", "--out", type=PATH, help="CSV file to write. [default: cases.csv in the folder, or RESULT.csv]")
 def table(results: Path, out: Path | None) -> None:
     """Write a CSV table of a result or a folder of results.
 
@@ -70,13 +70,10 @@ def table(results: Path, out: Path | None) -> None:
     Example:
       roughvisc table results/focus_variation-study -o table.csv
     """
-    from roughvisc.runs.folder import atomic_write
+    from roughvisc.runs.csv_files import write_table
 
     if results.is_dir():
-        path = out or results / "table.csv"
-        cases = rv.to_table(results)
-        with atomic_write(path) as temporary:
-            cases.to_csv(temporary, errors="surrogateescape")
+        path = write_table(results, out)
     else:
         with rv.open_result(results) as dataset:
             path = rv.to_csv(dataset, out or results.with_suffix(".csv"))

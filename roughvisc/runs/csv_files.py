@@ -81,12 +81,20 @@ def to_table(out: str | Path) -> pd.DataFrame:
     return table.set_index(pd.Index(numbers_of(cases).values(), name="case"))
 
 
-def write_table(folder: Path) -> None:
-    """Write the table of the last sweep in a folder as CSV; if writing fails, log a warning."""
+def write_table(folder: Path, path: Path | None = None) -> Path:
+    """Write the table of the last sweep in a folder as CSV, by default into the folder, and return its path."""
+    path = path or folder / CASES
+    table = to_table(folder)
+    with atomic_write(path) as temporary:
+        # spreadsheets need the byte-order mark of UTF-8; errors exceed the seventh digit
+        table.to_csv(temporary, encoding="utf-8-sig", errors="surrogateescape", float_format="%.7g")
+    return path
+
+
+def update_table(folder: Path) -> None:
+    """Write the table of the last sweep in a folder; if writing fails, log a warning."""
     try:
-        with atomic_write(folder / CASES) as temporary:
-            # spreadsheets need the byte-order mark of UTF-8; errors exceed the seventh digit
-            to_table(folder).to_csv(temporary, encoding="utf-8-sig", errors="surrogateescape", float_format="%.7g")
+        write_table(folder)
     except (OSError, InputError) as error:
         log.warning("%s cannot be written: %s", folder / CASES, error)
 

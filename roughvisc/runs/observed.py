@@ -13,7 +13,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.observables import OBSERVABLES
 from roughvisc.runs.cluster import default_client, require_synchronous
-from roughvisc.runs.csv_files import write_table
+from roughvisc.runs.csv_files import update_table
 from roughvisc.runs.folder import case_path, lock_case
 from roughvisc.runs.netcdf import open_result, write_result
 from roughvisc.runs.run import result_folder
@@ -69,7 +69,7 @@ def observe(
         if path.exists() and _add(case, path):
             added.append(path)
     if added and len(cases) > 1:
-        write_table(folder)
+        update_table(folder)
     return added
 
 

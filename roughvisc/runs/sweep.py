@@ -27,7 +27,7 @@ from roughvisc.runs.cluster import (
     require_synchronous,
     threads_each,
 )
-from roughvisc.runs.csv_files import write_table
+from roughvisc.runs.csv_files import update_table
 from roughvisc.runs.display import Display
 from roughvisc.runs.folder import (
     case_path,
@@ -225,7 +225,7 @@ def run_cases(
             index = index_of(folder, [outcome.entry for outcome in outcomes.values() if outcome.entry])
             for key in [key for key, one in outcomes.items() if one.entry is None and key in index]:
                 outcomes[key] = outcome_of(index[key], reused=True)  # another run has finished it
-            write_table(folder)
+            update_table(folder)
             display.close()
     return {key: outcomes[key] for key in distinct}
 

@@ -257,7 +257,7 @@ def test_unit_of__other_keys_and_parts_of_values():
 def test_study__of_a_quantity_without_quotes_shows_them(tmp_path):
     path = tmp_path / "study.toml"
     path.write_text('[surface]\nfile = "a.sur"\nfilter = 9.8 um  # noise\n')
-    with pytest.raises(rv.InputError, match='filter = "9.8 um"'):
+    with pytest.raises(rv.InputError, match=r"filter = \"9.8 um\""):
         rv.read_study(path)
     path.write_text("[surface]\nsize = 3 4\n")
     with pytest.raises(rv.InputError) as error:
