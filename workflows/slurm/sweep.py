@@ -35,7 +35,7 @@ def cluster(queue: str, walltime: str, memory: str = "4GB", logs: str = "slurm-l
         # time for a step and a checkpoint, and not all jobs at the same time
         worker_extra_args=["--lifetime", f"{0.85 * allowed:.0f}s", "--lifetime-stagger", f"{0.1 * allowed:.0f}s"],
         # scancel and the walltime send SIGTERM to the job's shell too: it waits for the worker's checkpoint
-        job_script_prologue=["trap : TERM", "export MALLOC_TRIM_THRESHOLD_=2146435072 MALLOC_MMAP_THRESHOLD_=33554432"],
+        job_script_prologue=["trap : TERM"],
     )
 
 
