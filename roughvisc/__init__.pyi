@@ -19,6 +19,7 @@ from roughvisc.mechanics.materials.creep import creep as creep
 from roughvisc.mechanics.materials.creep import pair as pair
 from roughvisc.mechanics.materials.creep import power_law as power_law
 from roughvisc.mechanics.materials.creep import shift as shift
+from roughvisc.mechanics.materials.creep import thermal as thermal
 from roughvisc.mechanics.materials.creep import wlf as wlf
 from roughvisc.mechanics.materials.prony import elastic as elastic
 from roughvisc.mechanics.materials.prony import from_relaxation as from_relaxation

@@ -25,7 +25,7 @@ from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.layer import layer
 from roughvisc.mechanics.materials import MODELS
-from roughvisc.mechanics.materials.creep import LARGEST_SHIFT, Material, arrhenius, shift, stiffened, wlf
+from roughvisc.mechanics.materials.creep import LARGEST_SHIFT, Material, arrhenius, shift, stiffened, thermal, wlf
 from roughvisc.mechanics.program import UNITS, Program
 from roughvisc.mechanics.sheet import sheet
 from roughvisc.observables import OBSERVABLES
@@ -316,14 +316,18 @@ def body_of(table: Mapping[str, Any], where: str = "material") -> Body:
 def material_of(table: Mapping[str, Any], where: str = "material") -> Material:
     """Return the material of a table, at its temperature."""
     model = one_of(f"{where}.model", table.get("model"), MODELS)
-    thermal, arguments = split(table, *TEMPERATURE)
+    stated, arguments = split(table, *TEMPERATURE)
     scaling, arguments = split(arguments, "model", "modulus_factor")
     if model == "pair":
         parts = split(arguments, "a", "b")[0]
         arguments |= {key: material_of(a_table(f"{where}.{key}", one), f"{where}.{key}") for key, one in parts.items()}
     material = call(MODELS[model], where, arguments)
-    factor = shift_factor(thermal, where)
-    material = material if factor == 1 else shift(material, factor)
+    factor = shift_factor(stated, where)
+    if "temperature" in stated:
+        constants = split(stated, "temperature")[1]
+        material = call(thermal, where, constants, material).at(stated["temperature"])
+    elif factor != 1:
+        material = shift(material, factor)
     stiffer = number(scaling.get("modulus_factor", 1), "1", f"{where}.modulus_factor", above=0)
     return material if stiffer == 1 else stiffened(material, stiffer)
 

@@ -11,7 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import partial
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,6 +29,9 @@ Array = NDArray[np.float64]
 LARGEST_SHIFT = 1e30
 #: Largest relative growth of a creep compliance that has settled.
 _SETTLED = 1e-9
+#: Notes of a material with other times, and with other moduli.
+_SHIFTED = "all times multiplied by {:.6g} (time-temperature shift)"
+_STIFFENED = "all moduli multiplied by {:.6g}"
 #: Decimal logarithm of the largest factor of WLF and Arrhenius.
 _LARGEST = 300.0
 
@@ -74,6 +78,8 @@ class Prony:
         Warning about the measurements, for the result.
     misfit : float
         Largest relative deviation from the rows of a creep table, zero if it is within their noise.
+    thermal : ThermalLaw or PairLaw
+        Law by which the material changes with temperature, if it has one; :meth:`at` uses it.
 
     Raises
     ------
@@ -92,6 +98,7 @@ class Prony:
     longest: float = field(default=math.inf, repr=False)
     warning: str = field(default="", compare=False, repr=False)
     misfit: float = field(default=0.0, compare=False, repr=False)
+    thermal: ThermalLaw | PairLaw | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "compliances", tuple(map(float, self.compliances)))
@@ -141,6 +148,10 @@ class Prony:
             found = found + compliance / (1 + s * time)
         return np.asarray(found)
 
+    def at(self, temperature: Quantity) -> Material:
+        """Return the material at another temperature [K], see :func:`at_temperature`."""
+        return at_temperature(self, temperature)
+
     def scaled(self, time_factor: float, modulus_factor: float, note: str = "") -> Prony:
         """Return the series with all times multiplied by one factor and all moduli by another."""
         return replace(
@@ -151,6 +162,7 @@ class Prony:
             times=tuple(time_factor * one for one in self.times),
             longest=time_factor * self.longest,
             note="; ".join(filter(None, (self.note, note))),
+            thermal=self.thermal and self.thermal.scaled(time_factor, modulus_factor),
         )
 
 
@@ -206,6 +218,8 @@ class Creep:
         Largest deviation from measurements, of a pair with a measured body.
     stands_for : str
         Name of the bodies if the function is not one body with this Poisson ratio; otherwise empty.
+    thermal : ThermalLaw or PairLaw
+        Law by which the material changes with temperature, if it has one; :meth:`at` uses it.
     """
 
     function: Callable[..., Any]
@@ -217,6 +231,7 @@ class Creep:
     warning: str = field(default="", compare=False)
     misfit: float = field(default=0.0, compare=False)
     stands_for: str = field(default="", compare=False)
+    thermal: ThermalLaw | PairLaw | None = field(default=None, compare=False)
 
     def __repr__(self) -> str:
         return f"{self.function.__name__}({', '.join(map(repr, self.parameters))})"
@@ -284,6 +299,10 @@ class Creep:
         crept = coefficient * math.gamma(1 + exponent) * (s * (self.time_factor * time_scale)) ** -exponent
         return np.asarray((glassy + crept) / self.modulus_factor)
 
+    def at(self, temperature: Quantity) -> Material:
+        """Return the material at another temperature [K], see :func:`at_temperature`."""
+        return at_temperature(self, temperature)
+
     def scaled(self, time_factor: float, modulus_factor: float, note: str = "") -> Material:
         """Return the material with all times multiplied by one factor and all moduli by another."""
         note = "; ".join(filter(None, (self.note, note)))
@@ -291,11 +310,67 @@ class Creep:
             a, b = (one.scaled(time_factor, modulus_factor) for one in self.parameters)
             return replace(pair(a, b), note=note)
         factors = time_factor * self.time_factor, modulus_factor * self.modulus_factor
-        return replace(self, time_factor=factors[0], modulus_factor=factors[1], note=note)
+        thermal = self.thermal and self.thermal.scaled(time_factor, modulus_factor)
+        return replace(self, time_factor=factors[0], modulus_factor=factors[1], note=note, thermal=thermal)
 
 
 #: The two kinds of materials.
 Material = Prony | Creep
+
+
+@dataclass(frozen=True)
+class ThermalLaw:
+    """Change of a material with temperature: one factor for all times, and one for all moduli.
+
+    Parameters
+    ----------
+    material : Prony or Creep
+        Material at the reference temperature.
+    temperature : float
+        Temperature of the material that has this law. [K]
+    shift : callable
+        Shift factor ``a_T`` at a temperature [K], relative to the reference. It refuses temperatures out of range.
+    moduli : callable, optional
+        Factor of all moduli at a temperature [K]. Default: they do not change.
+    """
+
+    material: Material
+    temperature: float
+    shift: Callable[[float], float]
+    moduli: Callable[[float], float] | None = None
+
+    def at(self, temperature: float) -> Material:
+        """Return the material at a temperature, with this law. [K]"""
+        factor, stiffer = self.shift(temperature), self.moduli(temperature) if self.moduli else 1.0
+        if not 1 / LARGEST_SHIFT <= factor <= LARGEST_SHIFT:
+            expected = f"a shift of times by a factor from {1 / LARGEST_SHIFT:g} to {LARGEST_SHIFT:g}, not {factor!r}"
+            raise InputError(key="temperature", found=temperature, expected=expected)
+        notes = [_SHIFTED.format(factor)] * (factor != 1) + [_STIFFENED.format(stiffer)] * (stiffer != 1)
+        material = self.material.scaled(factor, stiffer, "; ".join(notes))
+        return replace(material, thermal=replace(self, temperature=temperature))
+
+    def scaled(self, time_factor: float, modulus_factor: float) -> Self:
+        """Return the law of the material with all times multiplied by one factor and all moduli by another."""
+        return replace(self, material=self.material.scaled(time_factor, modulus_factor))
+
+
+@dataclass(frozen=True)
+class PairLaw:
+    """Change of a pair with temperature: both bodies change by their own law, and an elastic body does not change."""
+
+    a: Material
+    b: Material
+
+    def at(self, temperature: float) -> Material:
+        """Return the pair with both bodies at a temperature. [K]"""
+        elastic = [isinstance(one, Prony) and not one.fluidity and not one.times for one in (self.a, self.b)]
+        bodies = (self.a, self.b)
+        changed = [one if fixed else one.at(temperature) for one, fixed in zip(bodies, elastic, strict=True)]
+        return pair(*changed)
+
+    def scaled(self, time_factor: float, modulus_factor: float) -> PairLaw:
+        """Return the law of the pair with all times multiplied by one factor and all moduli by another."""
+        return PairLaw(*(one.scaled(time_factor, modulus_factor) for one in (self.a, self.b)))
 
 
 def creep(function: Callable[[Array], Any], poisson: float = 0.5) -> Creep:
@@ -407,6 +482,8 @@ def pair(a: Material, b: Material) -> Material:
         "warning": " ".join(filter(None, (body.warning for body in bodies))),
         "misfit": max(body.misfit for body in bodies),
     }
+    if a.thermal or b.thermal:
+        about["thermal"] = PairLaw(a, b)
     if not (isinstance(a, Prony) and isinstance(b, Prony)):
         return Creep(pair_creep, bodies, **about)
     glassy, fluidity = 0.0, 0.0
@@ -543,8 +620,84 @@ def shift(material: Material, factor: float) -> Material:
     3e-06
     """
     factor = number(factor, "1", "factor", least=1 / LARGEST_SHIFT, most=LARGEST_SHIFT)
-    note = f"all times multiplied by {factor:.6g} (time-temperature shift)"
-    return check_material(material).scaled(factor, 1.0, note)
+    return check_material(material).scaled(factor, 1.0, _SHIFTED.format(factor))
+
+
+@quantities(reference_temperature="K > 0", activation_energy="J/mol > 0", wlf_c1="1 > 0")
+def thermal(
+    material: Material,
+    reference_temperature: Quantity,
+    *,
+    wlf_c1: float | None = None,
+    wlf_c2: float | str | None = None,
+    activation_energy: Quantity | None = None,
+) -> Material:
+    """Give a material its law of temperature, so that ``material.at("40 degC")`` is the material at 40 degC.
+
+    Parameters
+    ----------
+    material : Prony or Creep
+        Material at its reference temperature.
+    reference_temperature : float or str
+        Temperature at which the compliance was measured. [K]
+    wlf_c1, wlf_c2 : float or str
+        Constants of :func:`wlf`. [-], [K]
+    activation_energy : float or str
+        Constant of :func:`arrhenius`, instead. [J/mol]
+
+    Returns
+    -------
+    Prony or Creep
+        The same material at its reference temperature, with the law.
+
+    Raises
+    ------
+    InputError
+        If a number is wrong, or the law is not stated by either `wlf_c1` and `wlf_c2` or `activation_energy`.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rubber = rv.thermal(rv.maxwell(1e6, 1e6), "20 degC", wlf_c1=8.0, wlf_c2=90.0)
+    >>> warm = rubber.at("30 degC")  # log10 a = -8 * 10 / 100
+    >>> round(rubber.fluidity / warm.fluidity, 4)
+    0.1585
+    """
+    constants: dict[str, Any] = {"wlf_c1": wlf_c1, "wlf_c2": wlf_c2}
+    for key, value in constants.items():
+        if (value is None) == (activation_energy is None):
+            raise InputError(key=key, found=value, expected="either wlf_c1 and wlf_c2 or activation_energy")
+    function, constants = (
+        (wlf, constants) if activation_energy is None else (arrhenius, {"activation_energy": activation_energy})
+    )
+    law = partial(function, reference_temperature=reference_temperature, **constants)
+    law(reference_temperature)  # refuses wrong constants
+    material = replace(check_material(material), thermal=None)
+    return replace(material, thermal=ThermalLaw(material, reference_temperature, law))
+
+
+def at_temperature(material: Material, temperature: Quantity) -> Material:
+    """Return a material at another temperature, by its own law.
+
+    Parameters
+    ----------
+    material : Prony or Creep
+        A material with a law: from :func:`thermal`, from a table with several temperatures, or from a study with a
+        temperature. Both bodies of a pair are brought to the temperature; an elastic body does not change.
+    temperature : float or str
+        The temperature. [K]
+
+    Raises
+    ------
+    InputError
+        If the material has no law, or the temperature is outside the range of the law.
+    """
+    temperature = number(temperature, "K", "temperature", above=0)
+    law = check_material(material).thermal
+    if law is None:
+        expected = "a material with a law of temperature: rv.thermal(material, ...), or a table with temperatures"
+        raise InputError(key="material", found=material, expected=expected)
+    return law.at(temperature)
 
 
 def stiffened(material: Material, factor: float) -> Material:
@@ -574,7 +727,7 @@ def stiffened(material: Material, factor: float) -> Material:
     5e-07
     """
     factor = number(factor, "1", "modulus_factor", above=0)
-    return check_material(material).scaled(1.0, factor, f"all moduli multiplied by {factor:.6g}")
+    return check_material(material).scaled(1.0, factor, _STIFFENED.format(factor))
 
 
 def check_material(material: Any, key: str = "material") -> Material:

@@ -102,6 +102,7 @@ def test_temperature__wlf_arrhenius_and_their_factor_state_the_same(read_one):
     # 10 K above the reference: log10 a = -8 * 10 / 100; the series is that of a Zener solid of 0.1 s
     case, warm = read_one(), read_one(material=ZENER | WLF)
     assert warm.material.times == pytest.approx((0.1 * 10**-0.8,))
+    assert warm.material.at("20 °C") == case.material
     assert read_one(material=ZENER | {"shift_factor": 10**-0.8}).material.times == pytest.approx(warm.material.times)
     assert warm.key != case.key
     arrhenius = read_one(material=ZENER | ARRHENIUS).material
