@@ -60,7 +60,7 @@ def test_material_at_a_temperature__is_the_shifted_material(law):
 
 
 def test_shifted__a_table_ends_later_in_the_cold():
-    cold = rv.shift(rv.creep_table((0.0, 1.0, 700.0), (1e-7, 2e-7, 8e-7)), 10.0)
+    cold = rv.shift(rv.creep_table((0.0, 1.0, 700.0), (1e-7, 2e-7, 8e-7), kind="shear"), 10.0)
     assert cold.contact_compliance(7000.0) == pytest.approx(8e-7 / 4)
     with pytest.raises(rv.InputError, match="table ends at 7000 s"):
         cold.contact_compliance(7001.0)
