@@ -41,6 +41,7 @@ from roughvisc.study.case import vary as vary
 from roughvisc.study.execution.sweep import observe as observe
 from roughvisc.study.execution.sweep import sweep as sweep
 from roughvisc.study.machine_history import read_program as read_program
+from roughvisc.study.material_file import read_material as read_material
 from roughvisc.study.neighbours import budget as budget
 from roughvisc.study.plan import plan as plan
 from roughvisc.study.storage.netcdf import open_result as open_result

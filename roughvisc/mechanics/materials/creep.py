@@ -42,13 +42,15 @@ def check_poisson(poisson: float) -> None:
     number(poisson, "1", "poisson", above=-1, most=0.5)
 
 
-def check_terms(name: str, terms: Sequence[float], unit: str, times: Sequence[float]) -> None:
+def check_terms(
+    name: str, terms: Sequence[float], unit: str, times: Sequence[float], name_of_times: str = "times"
+) -> None:
     """Refuse terms of a series that are negative, or fewer or more than their times, which are positive."""
     if len(terms) != len(times):
-        raise InputError(key=name, found=len(terms), expected=f"as many as times, {len(times)}")
+        raise InputError(key=name, found=len(terms), expected=f"as many as {name_of_times}, {len(times)}")
     for i, (term, time) in enumerate(zip(terms, times, strict=True)):
         number(term, unit, f"{name}[{i}]", least=0)
-        number(time, "s", f"times[{i}]", above=0)
+        number(time, "s", f"{name_of_times}[{i}]", above=0)
 
 
 @quantities(glassy="1/Pa >= 0", fluidity="1/(Pa s) >= 0", compliances="1/Pa ...", times="s ...")

@@ -44,6 +44,11 @@ _MODULI, _CREEP = (3.0, 2e-4), (10.0, 1e-7)
 #: that count as equal. The ratio refuses all of 14 tables with several temperatures or amplitudes, and none of 56
 #: others, whose largest ratio was 1.02 to 1.06.
 _ONE_TEMPERATURE, _SAME_FREQUENCY = 1.1, 1e-3
+#: Decades before the first time of a relaxation test that are extrapolated, and scale of these rows over their modulus;
+#: largest time of the rows that are continued, over the first one, their smallest number, and the ratio of the first to
+#: the mean slope from which they are the tail of one process.
+_EXTRAPOLATED, _BEFORE = 1.5, 10.0
+_FIRST_ROWS, _FEWEST_ROWS, _STEEPER = 4.0, 4, 2.0
 #: Largest ratio of values at equal, rounded times.
 _EQUAL_TIMES = 2.0
 #: Part of the largest compliance below which a row at most zero is left out, if the noise is less.
@@ -253,6 +258,14 @@ def dynamic_table(
     return known.at_temperature((omega, elastic, viscous), temperatures, temperature)
 
 
+class _Checked(NamedTuple):
+    """Columns of one temperature without rows that are noise; a note of these rows, and their number."""
+
+    columns: Columns
+    note: str = ""
+    left_out: int = 0
+
+
 @dataclass(frozen=True)
 class _Measured:
     """Statements about the rows of a table, and the series fitted to rows."""
@@ -271,7 +284,7 @@ class _Measured:
             for key, value in (("temperature", temperature), ("vertical", self.vertical)):
                 if value is not None:
                     raise InputError(key=key, found=value, expected="temperatures, one for each row")
-            return self.series(*self.checked(columns))
+            return self.series(self.checked(columns))
         names = ("frequency or time", *["value"] * (len(columns) - 1), "temperature")
         *_, measured = _columns(names, *columns, temperatures)
         _, group = groups_of(measured)
@@ -280,7 +293,7 @@ class _Measured:
         if group.max() == 0:
             if temperature is not None and not lowest <= temperature <= highest:
                 raise InputError(key="temperature", found=temperature, expected=f"the measured temperature, {within}")
-            return replace(self, note=joined(self.note, f"measured at {within}")).series(*self.checked(columns))
+            return replace(self, note=joined(self.note, f"measured at {within}")).series(self.checked(columns))
         if temperature is None:
             expected = f"the temperature of the contact, within the measured ones, {within}"
             raise InputError(key="temperature", found=None, expected=expected)
@@ -289,8 +302,8 @@ class _Measured:
         assert isinstance(found, Prony)
         return found
 
-    def checked(self, columns: Columns, rows: NDArray[np.intp] | None = None) -> tuple[Columns, str]:
-        """Return the columns of one temperature without rows that are noise, and a note of the rows left out.
+    def checked(self, columns: Columns, rows: NDArray[np.intp] | None = None) -> _Checked:
+        """Return the columns of one temperature without rows that are noise.
 
         Parameters
         ----------
@@ -301,7 +314,7 @@ class _Measured:
         """
         rows = np.arange(columns[0].size) if rows is None else rows
         if self.quantity == "dynamic":
-            return self._checked_moduli(columns, rows), ""
+            return _Checked(self._checked_moduli(columns, rows))
         t, values = columns
         name = "compliance" if self.quantity == "creep" else "modulus"
         largest = float(values.max())
@@ -313,10 +326,12 @@ class _Measured:
             again = f"time {t[place]:g} after {t[place - 1]:g}: expected ascending time"
             raise InputError(f"table row {rows[place]}: {again}; several temperatures? {_TELL}")
         notes = []
+        left_out = 0
         if self.quantity == "creep":
             kept = (values > 0) | ((t == 0) & (values == 0))
-            if count := np.count_nonzero(~kept):
-                notes.append(f"{count} rows at most zero left out")
+            left_out = int(np.count_nonzero(~kept))
+            if left_out:
+                notes.append(f"{left_out} rows at most zero left out")
             t, values, rows = t[kept], values[kept], rows[kept]
         elif values[t == 0].size and values[t == 0].min() <= 0:
             raise InputError(f"table row {rows[0]}: modulus is {values[0]:g} at time zero: expected a positive modulus")
@@ -338,7 +353,7 @@ class _Measured:
                 expected = "ascending compliances or more noise"
                 found = f"{below}, noise is {self.noise:g} of the largest"
                 raise InputError(f"table row {rows[place]}: {found}: expected {expected}")
-        return (t, values), "; ".join(notes)
+        return _Checked((t, values), "; ".join(notes), left_out)
 
     def _checked_moduli(self, columns: Columns, rows: NDArray[np.intp]) -> Columns:
         """Return frequency, storage and loss of one temperature; refuse rows of several."""
@@ -366,28 +381,34 @@ class _Measured:
             raise InputError(f"table row {rows[row]}: {again}: several temperatures? expected one; {_TELL}")
         return columns
 
-    def series(self, columns: Columns, note: str = "") -> Prony:
+    def series(self, checked: _Checked) -> Prony:
         """Return the series fitted to rows of one temperature."""
         factor = tensile_to_shear(self.kind, self.poisson)
-        about = joined(self.note, note)
+        about, columns = joined(self.note, checked.note), checked.columns
         if self.quantity == "creep":
-            return self._creep(columns[0], columns[1] * factor, about)
+            return self._creep(columns[0], columns[1] * factor, about, checked.left_out > 0)
         if self.quantity == "relaxation":
             return self._relaxation(columns[0], columns[1] / factor, about)
         return self._dynamic(columns[0], columns[1] / factor, columns[2] / factor, about)
 
-    def _creep(self, t: Array, values: Array, note: str) -> Prony:
+    def _creep(self, t: Array, values: Array, note: str, is_late: bool) -> Prony:
         # equal weights of relative deviations; a compliance of zero comes first and does not move
         highest = float(values.max())
         weights = (highest / np.where(values > 0, values, highest)) ** 2
         ascending = np.maximum.accumulate(scipy.optimize.isotonic_regression(values, weights=weights).x)
         rows, measured = t[t > 0], values[t > 0]
-        glassy = float(ascending[0]) if t[0] == 0 else _instantaneous(rows, ascending)
+        before, softer, glassy = np.zeros(0), np.zeros(0), float(ascending[0])
+        if t[0] > 0:
+            glassy = _instantaneous(rows, ascending)
+        if t[0] > 0 and is_late:
+            before, softer = _earlier_creep(rows, ascending, glassy)
+        times, course = np.append(before, rows), np.append(softer, measured)
+        scale = np.append(_BEFORE * softer, measured)
 
         def columns(tau: Array) -> Array:
-            return np.column_stack([rows / rows[-1], -np.expm1(-rows[:, None] / tau)])
+            return np.column_stack([times / times[-1], -np.expm1(-times[:, None] / tau)])
 
-        weights, tau, fit = _fitted(columns, rows, measured, measured - glassy, measured, _CREEP)
+        weights, tau, fit = _fitted(columns, times, course, course - glassy, scale, _CREEP, before.size)
         text = f"{fit.note}, times {t[0]:g} to {t[-1]:g} s"
         if t[0] > 0:
             missing = f"nothing was measured before {t[0]:g} s"
@@ -405,15 +426,21 @@ class _Measured:
         )
 
     def _relaxation(self, t: Array, shear: Array, note: str) -> Prony:
-        later = t > 0
         # rows at most zero state that all moduli are known to the noise of the largest
         scale = np.maximum(shear, self.noise * shear.max()) if shear.min() <= 0 else shear
+        before, stiffer = _earlier(t, scale)
+        times, target = np.append(before, t), np.append(stiffer, shear)
+        course = np.append(stiffer, scale)
+        scale = np.append(_BEFORE * stiffer, scale)
+        later = times > 0
 
         def columns(theta: Array) -> Array:
-            return np.column_stack([np.ones(t.size), np.exp(-t[:, None] / theta)])
+            return np.column_stack([np.ones(times.size), np.exp(-times[:, None] / theta)])
 
-        weights, theta, fit = _fitted(columns, t[later], scale[later], shear, scale, _MODULI)
+        weights, theta, fit = _fitted(columns, times[later], course[later], target, scale, _MODULI, before.size)
         text = f"{fit.note}, times {t[0]:g} to {t[-1]:g} s"
+        if before.size:
+            text += f"; nothing was measured before {t[0]:g} s: modulus extrapolated to {before[0]:.3g} s"
         if shear.min() <= 0:
             text += f"; moduli are known to {self.noise:g} of the largest, since some are at most zero"
         about = {"note": joined(text, note), "warning": joined(fit.warning, self._misfit(fit), " ")}
@@ -463,14 +490,14 @@ def _superposed(known: _Measured, *columns: tuple[float, ...]) -> ThermalLaw:
     one_of("vertical", known.vertical, get_args(Vertical))
     tensile_to_shear(known.kind, known.poisson)
     _, group = groups_of(temperatures)
-    parts, of_parts, notes = [], [], []
+    parts = []
+    of_parts = []
     for number_of_group in range(int(group.max()) + 1):
         rows = np.flatnonzero(group == number_of_group)
-        part, note = known.checked(tuple(column[rows] for column in given), rows)
+        part = known.checked(tuple(column[rows] for column in given), rows)
         parts.append(part)
-        of_parts.append(np.full(part[0].size, temperatures[rows].mean()))
-        notes += [note] * bool(note)
-    at, *values = (np.concatenate(column) for column in zip(*parts, strict=True))
+        of_parts.append(np.full(part.columns[0].size, temperatures[rows].mean()))
+    at, *values = (np.concatenate(column) for column in zip(*(part.columns for part in parts), strict=True))
     names: tuple[Any, ...] = ("storage", "loss") if known.quantity == "dynamic" else (known.quantity,)
     later = at > 0  # a row at time zero has no reduced time
     values = [value[later] for value in values]
@@ -482,8 +509,9 @@ def _superposed(known: _Measured, *columns: tuple[float, ...]) -> ThermalLaw:
     reduced, rows_at_reference = found.reduced()
     order = np.argsort(reduced, kind="stable")
     master = (reduced[order], *(value[order] for value in rows_at_reference.values()))
-    about = joined(found.note, "; ".join(dict.fromkeys(notes)))
-    material = replace(known, is_master=True).series(master, about)
+    notes = [found.note, *dict.fromkeys(part.note for part in parts)]
+    checked = _Checked(master, "; ".join(filter(None, notes)), sum(part.left_out for part in parts))
+    material = known.series(checked)
     material = replace(material, warning=joined(material.warning, found.warning, " "))
     shift, moduli = found.shift_factor, found.modulus_factor if known.vertical == "rubber" else None
     return ThermalLaw(material, found.reference_temperature, shift, moduli)
@@ -532,7 +560,13 @@ class _Fit(NamedTuple):
 
 
 def _fitted(
-    columns: Callable[[Array], Array], at: Array, course: Array, target: Array, scale: Array, most: tuple[float, float]
+    columns: Callable[[Array], Array],
+    at: Array,
+    course: Array,
+    target: Array,
+    scale: Array,
+    most: tuple[float, float],
+    unmeasured: int = 0,
 ) -> tuple[Array, Array, _Fit]:
     """Return the non-negative weights of a series, its times [s], and its misfit.
 
@@ -546,6 +580,8 @@ def _fitted(
         Target of the sum of the columns, and scale of the misfit of each row.
     most : tuple of float
         See :data:`_MODULI`.
+    unmeasured : int
+        Number of first rows that are extrapolated and do not count in the misfit.
 
     Notes
     -----
@@ -564,12 +600,13 @@ def _fitted(
             rows, wanted = np.vstack([rows, smooth]), np.append(wanted, np.zeros(len(smooth)))
         weights = nonnegative(rows, wanted, np.ones(len(rows)))
         misfit, used = np.abs((terms @ weights - target) / scale), np.append(True, weights[1:] > 0)
+        misfit = misfit[unmeasured:]
         rms = float(np.sqrt(np.mean(misfit**2)))
         fits.append((rms, float(misfit.max()), weights[used], times[used[1:]]))
     enough = max(_FEWER * min(fit[0] for fit in fits), most[1])
     rms, largest, weights, times = min((fit for fit in fits if fit[0] <= enough), key=lambda fit: fit[3].size)
     count, misfits = np.count_nonzero(weights), f"largest misfit {largest:.2g}, rms {rms:.2g} (relative)"
-    note = f"{count} terms fitted to {target.size} values, {misfits}"
+    note = f"{count} terms fitted to {target.size - unmeasured} values, {misfits}"
     return weights, times, _Fit(rms, largest, note, _gap(at))
 
 
@@ -584,6 +621,47 @@ def _gap(times: Array) -> str:
     before, after = (format_quantity(float(one), "s") for one in times[ratios.argmax() :][:2])
     what = f"The table of the material has no row between {before} and {after}, more than a decade"
     return f"{what}: the material between is a guess that stated errors do not include. Use one row per decade."
+
+
+def _earlier(times: Array, moduli: Array) -> tuple[Array, Array]:
+    """Return times before the first of a relaxation test, ascending [s], and moduli there.
+
+    The modulus goes on as a power of time with the mean slope of the first rows or of the first decade, or flattens
+    towards earlier times as it does in the first rows, whichever rises less. It is not continued if the first rows are
+    the tail of one fast process. A series without these rows ends at a third of the first time: its
+    compliance there is a quarter too large for a polymer in the glass transition.
+    """
+    nothing = np.zeros(0)
+    first = times <= _FIRST_ROWS * times[0]
+    if times[0] == 0 or np.count_nonzero(first) < _FEWEST_ROWS:
+        return nothing, nothing
+    x, y = np.log(times[first] / times[0]), np.log(moduli[first])
+    decade = times <= 10 * times[0]
+    of_decade, _ = np.polyfit(np.log(times[decade]), np.log(moduli[decade]), 1)
+    mean = max(np.polyfit(x, y, 1)[0], of_decade)
+    bend, slope, level = np.polyfit(x, y, 2)
+    if slope < _STEEPER * mean:
+        return nothing, nothing
+    earlier = np.linspace(-_EXTRAPOLATED * np.log(10), 0.0, int(6 * _EXTRAPOLATED) + 1)
+    slopes = np.minimum(np.maximum(mean, slope + 2 * min(bend, 0.0) * earlier), 0.0)
+    steps = np.diff(earlier) * (slopes[1:] + slopes[:-1]) / 2
+    rise = -np.cumsum(steps[::-1])[::-1]
+    return times[0] * np.exp(earlier[:-1]), np.exp(level + rise)
+
+
+def _earlier_creep(times: Array, compliances: Array, glassy: float) -> tuple[Array, Array]:
+    """Return times before the first of a creep test, ascending [s], and compliances there, [1/Pa].
+
+    The compliance is a power of time above the instantaneous one, with the slope of the first rows. They replace first
+    rows that are lost in noise.
+    """
+    first = times <= _FIRST_ROWS * times[0]
+    if np.count_nonzero(first) < _FEWEST_ROWS or not compliances[0] > glassy:
+        return np.zeros(0), np.zeros(0)
+    slope, _ = np.polyfit(np.log(times[first]), np.log(compliances[first]), 1)
+    exponent = min(slope * compliances[0] / (compliances[0] - glassy), 1.0)
+    ratios = 10 ** np.linspace(-_EXTRAPOLATED, 0.0, int(6 * _EXTRAPOLATED) + 1)[:-1]
+    return times[0] * ratios, glassy + (compliances[0] - glassy) * ratios**exponent
 
 
 def _instantaneous(times: Array, compliances: Array) -> float:
