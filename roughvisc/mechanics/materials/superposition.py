@@ -77,6 +77,8 @@ class Superposition:
         Number of the temperature of each row.
     values : dict of str to ndarray
         Measured rows: ``storage`` and ``loss`` [Pa], ``relaxation`` [Pa] or ``creep`` [1/Pa].
+    factor : float
+        Measured modulus over the shear modulus. [-]
     """
 
     temperatures: Array
@@ -91,6 +93,7 @@ class Superposition:
     at: Array
     group: NDArray[np.intp]
     values: dict[str, Array]
+    factor: float = 1.0
 
     @property
     def reference_temperature(self) -> float:

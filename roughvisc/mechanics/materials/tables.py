@@ -488,7 +488,7 @@ def _superposed(known: _Measured, *columns: tuple[float, ...]) -> ThermalLaw:
     """
     *given, temperatures = (np.array(column) for column in columns)
     one_of("vertical", known.vertical, get_args(Vertical))
-    tensile_to_shear(known.kind, known.poisson)
+    factor = tensile_to_shear(known.kind, known.poisson)
     _, group = groups_of(temperatures)
     parts = []
     of_parts = []
@@ -505,7 +505,7 @@ def _superposed(known: _Measured, *columns: tuple[float, ...]) -> ThermalLaw:
     least = known.noise * float(values[0].max()) if is_noisy else 0.0
     rows_of = dict(zip(names, values, strict=True))
     found = superpose(np.concatenate(of_parts)[later], at[later], rows_of, known.vertical, least)
-    found = replace(found, bounds=(float(temperatures.min()), float(temperatures.max())))
+    found = replace(found, bounds=(float(temperatures.min()), float(temperatures.max())), factor=factor)
     reduced, rows_at_reference = found.reduced()
     order = np.argsort(reduced, kind="stable")
     master = (reduced[order], *(value[order] for value in rows_at_reference.values()))
