@@ -269,7 +269,7 @@ def test_master_curve__has_the_shifted_rows_on_the_line_of_the_material():
     for points, line, exact in zip(curve.collections, curve.lines, (storage, loss), strict=True):
         at, moduli = np.ma.getdata(points.get_offsets()).T
         assert np.log10(at) == pytest.approx(np.log10(x), abs=0.02)
-        assert moduli == pytest.approx(1e-6 * exact)
+        assert moduli == pytest.approx(1e-3 * exact)  # kPa
         assert np.interp(np.log(at), np.log(line.get_xdata()), line.get_ydata()) == pytest.approx(moduli, rel=0.05)
     assert np.ma.getdata(shifts.collections[-1].get_offsets())[:, 1] == pytest.approx([1, 0, -1], abs=0.02)
     with refused("material"):
