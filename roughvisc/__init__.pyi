@@ -21,6 +21,7 @@ from roughvisc.mechanics.materials.creep import power_law as power_law
 from roughvisc.mechanics.materials.creep import shift as shift
 from roughvisc.mechanics.materials.creep import thermal as thermal
 from roughvisc.mechanics.materials.creep import wlf as wlf
+from roughvisc.mechanics.materials.fractional import fractional_zener as fractional_zener
 from roughvisc.mechanics.materials.prony import elastic as elastic
 from roughvisc.mechanics.materials.prony import from_relaxation as from_relaxation
 from roughvisc.mechanics.materials.prony import kelvin_voigt as kelvin_voigt

@@ -132,6 +132,11 @@ class Prony:
         """Shear compliance after endless creep, infinite for a fluid. [1/Pa]"""
         return math.inf if self.fluidity else self.glassy + sum(self.compliances)
 
+    @property
+    def is_solid(self) -> bool:
+        """Whether endless creep ends at a finite compliance."""
+        return not self.fluidity
+
     def laplace(self, s: NDArray[Any]) -> NDArray[Any]:
         """Return the shear compliance under a pressure that grows as ``exp(s t)``. [1/Pa]
 
@@ -212,6 +217,8 @@ class Creep:
         Poisson ratio, constant in time.
     time_factor, modulus_factor : float
         Factors of all times and of all moduli. [-]
+    transform : callable, optional
+        ``transform(s, *parameters)`` returns ``s`` times the Laplace transform of ``J`` [1/Pa] at rates ``s`` [1/s].
     note : str
         Origin of the material.
     warning : str
@@ -229,6 +236,7 @@ class Creep:
     poisson: float = 0.5
     time_factor: float = 1.0
     modulus_factor: float = 1.0
+    transform: Callable[..., Any] | None = field(default=None, repr=False)
     note: str = field(default="", compare=False)
     warning: str = field(default="", compare=False)
     misfit: float = field(default=0.0, compare=False)
@@ -270,13 +278,18 @@ class Creep:
 
     @property
     def has_laplace(self) -> bool:
-        """Whether :meth:`laplace` is known."""
+        """Whether :meth:`laplace` is known: of both bodies, if the material is a pair."""
         if self.function is pair_creep:
             return all(not isinstance(body, Creep) or body.has_laplace for body in self.parameters)
-        return self.function is power_creep
+        return self.transform is not None
+
+    @property
+    def is_solid(self) -> bool:
+        """Whether endless creep ends at a finite compliance."""
+        return math.isfinite(self.final_compliance)
 
     def laplace(self, s: NDArray[Any]) -> NDArray[Any]:
-        """Return the shear compliance of a power law or a pair under a pressure that grows as ``exp(s t)``. [1/Pa]
+        """Return the shear compliance under a pressure that grows as ``exp(s t)``. [1/Pa]
 
         Parameters
         ----------
@@ -291,15 +304,13 @@ class Creep:
         Raises
         ------
         InputError
-            If the function is another one: its transform is not known.
+            If the material has no transform.
         """
-        if not self.has_laplace:
-            raise InputError(key="material", found=self, expected="a series or a power law, with a known transform")
         if self.function is pair_creep:
             return np.asarray(sum(2 * (1 - body.poisson) * body.laplace(s) for body in self.parameters))
-        glassy, coefficient, exponent, time_scale = self.parameters
-        crept = coefficient * math.gamma(1 + exponent) * (s * (self.time_factor * time_scale)) ** -exponent
-        return np.asarray((glassy + crept) / self.modulus_factor)
+        if self.transform is None:
+            raise InputError(key="material", found=self, expected="a material with a known transform, such as a series")
+        return np.asarray(self.transform(s * self.time_factor, *self.parameters) / self.modulus_factor)
 
     def at(self, temperature: Quantity) -> Material:
         """Return the material at another temperature [K], see :func:`at_temperature`."""
@@ -375,7 +386,9 @@ class PairLaw:
         return PairLaw(*(one.scaled(time_factor, modulus_factor) for one in (self.a, self.b)))
 
 
-def creep(function: Callable[[Array], Any], poisson: float = 0.5) -> Creep:
+def creep(
+    function: Callable[[Array], Any], poisson: float = 0.5, *, laplace: Callable[[NDArray[Any]], Any] | None = None
+) -> Creep:
     """Material by its shear creep compliance.
 
     Parameters
@@ -385,6 +398,9 @@ def creep(function: Callable[[Array], Any], poisson: float = 0.5) -> Creep:
         at an infinite time: a finite value makes the material a solid with this compliance after endless creep.
     poisson : float
         Poisson ratio, constant in time.
+    laplace : callable, optional
+        ``s`` times the Laplace transform of ``J``, [1/Pa], for an array of real or complex rates ``s`` [1/s]. With it
+        friction and layers need no fitted series.
 
     Returns
     -------
@@ -393,7 +409,7 @@ def creep(function: Callable[[Array], Any], poisson: float = 0.5) -> Creep:
     Raises
     ------
     InputError
-        If the function cannot be called, or a number is out of its range.
+        If a function cannot be called, or a number is out of its range.
 
     Examples
     --------
@@ -405,8 +421,10 @@ def creep(function: Callable[[Array], Any], poisson: float = 0.5) -> Creep:
     """
     if not callable(function):
         raise InputError(key="function", found=function, expected="a function of time, the creep compliance [1/Pa]")
+    if laplace is not None and not callable(laplace):
+        raise InputError(key="laplace", found=laplace, expected="a function of the rate, the compliance [1/Pa]")
     check_poisson(poisson)
-    return Creep(function, (), poisson)
+    return Creep(function, (), poisson, transform=laplace)
 
 
 @quantities(glassy="1/Pa >= 0", coefficient="1/Pa > 0", exponent="1 > 0", time_scale="s > 0")
@@ -445,7 +463,14 @@ def power_law(
     """
     check_poisson(poisson)
     number(exponent, "1", "exponent", above=0, below=1)
-    return Creep(power_creep, (glassy, coefficient, exponent, time_scale), poisson)
+    return Creep(power_creep, (glassy, coefficient, exponent, time_scale), poisson, transform=power_transform)
+
+
+def power_transform(
+    s: NDArray[Any], glassy: float, coefficient: float, exponent: float, time_scale: float
+) -> NDArray[Any]:
+    """Return the shear compliance of a power law under a pressure that grows as ``exp(s t)``. [1/Pa]"""
+    return np.asarray(glassy + coefficient * math.gamma(1 + exponent) * (s * time_scale) ** -exponent)
 
 
 def power_creep(t: Array, glassy: float, coefficient: float, exponent: float, time_scale: float) -> Array:

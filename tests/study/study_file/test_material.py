@@ -30,6 +30,10 @@ ARRHENIUS = {"temperature": 303.15, "reference_temperature": "20 °C", "activati
         ("prony", {"glassy": "1 GPa^-1", "compliances": [1e-6], "times": [1]}),
         ("prony", {"glassy": 1e-9}),
         ("power_law", {"glassy": 0, "coefficient": "1 MPa^-1", "exponent": 0.4, "time_scale": "2 h"}),
+        (
+            "fractional_zener",
+            {"instantaneous": "1 GPa", "equilibrium": "1 MPa", "relaxation_time": "1 ms", "exponent": 0.5},
+        ),
         ("creep_table", {"times": [0, "2 min"], "compliances": [1, 2], "noise": 0.01, "kind": "tensile"}),
         ("relaxation_table", {"times": [0, 1], "moduli": ["3 MPa", 2e6], "poisson": 0.3, "kind": "shear"}),
         ("dynamic_table", MODULI | {"storage": [2, 3], "loss": [1, "1 Pa"]}),
