@@ -69,7 +69,7 @@ def master_curve(material: Prony | Creep) -> Figure:
     over = "frequency [rad/s]" if "storage" in rows else "time [s]"
     curve.set_xlabel(f"Reduced {over} at {superposed.reference_temperature - 273.15:.4g} °C")
     curve.set_ylabel(unit.label("Compliance" if is_creep else "Modulus"))
-    bars = np.hypot(2 * superposed.sigma, np.nan_to_num(superposed.split))
+    bars = np.hypot(2 * np.nan_to_num(superposed.sigma), np.nan_to_num(superposed.split))
     shifts.errorbar(celsius, superposed.log_shift, bars, fmt="-", color="0.45", lw=0.8, zorder=1)
     shifts.scatter(celsius, superposed.log_shift, c=celsius, cmap=_COLOURS, norm=colours, s=18, zorder=2)
     shifts.set(xlabel="Temperature [°C]", ylabel=r"$\log_{10}\, a_T$")

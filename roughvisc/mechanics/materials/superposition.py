@@ -58,7 +58,7 @@ class Superposition:
     log_shift : ndarray
         Decimal logarithms of the shift factors ``a_T``, relative to the reference.
     sigma : ndarray
-        Their standard deviations, from the scatter of the rows.
+        Their standard deviations, from the scatter of the rows; NaN if the rows are too few to state it.
     split : ndarray
         Half the differences of the shifts from storage and from loss; NaN for creep and relaxation.
     other : float
@@ -141,7 +141,8 @@ class Superposition:
         pairs = zip(self.log_shift, celsius, strict=True)
         shifts = ", ".join(f"{shift:.2f} at {degrees:.1f}" for shift, degrees in pairs)
         notes = [f"{celsius.size} temperatures superposed, log10 a_T = {shifts} degC"]
-        notes.append(f"standard deviation up to {self.sigma.max():.2g}")
+        is_known = np.isfinite(self.sigma).all()
+        notes.append(f"standard deviation {f'up to {self.sigma.max():.2g}' if is_known else 'not known: too few rows'}")
         if np.isfinite(self.scatter):
             notes.append(f"scatter of {self.scatter:.2g} about a smooth curve of 1/T")
         if np.isfinite(self.split).any():
@@ -154,7 +155,7 @@ class Superposition:
     def warning(self) -> str:
         """Warning of uncertain shifts; empty if they are known."""
         split = np.nan_to_num(self.split)
-        uncertain = np.maximum(split, self.sigma)
+        uncertain = np.fmax(split, self.sigma)
         if uncertain.max() <= _UNCERTAIN:
             return ""
         worst = int(uncertain.argmax())
@@ -312,7 +313,9 @@ class _Rows:
         jacobian = fit.jacobian(self.group, free)
         spare = int(self.at.size - free.size - np.count_nonzero(fit.weights))
         sigma = np.zeros(start.size)
-        sigma[free] = np.sqrt(fit.cost / max(spare, 1) * np.diag(np.linalg.pinv(jacobian.T @ jacobian)))
+        sigma[free] = (
+            np.nan if spare < 1 else np.sqrt(fit.cost / spare * np.diag(np.linalg.pinv(jacobian.T @ jacobian)))
+        )
         return shifts, sigma, float(np.sqrt(np.mean(fit.residual**2)))
 
     def _fit(self, shifts: Array, moduli: Array) -> _Fit:
