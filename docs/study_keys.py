@@ -17,7 +17,8 @@ from roughvisc.mechanics.materials.material import stiffened
 from roughvisc.mechanics.program import UNITS, Program
 from roughvisc.settings import Numerics, Settings
 from roughvisc.study.machine_history import read_history
-from roughvisc.study.study_file import COLUMNS, PROGRAMS, SEGMENTS, TABLE_OF, unit_of
+from roughvisc.study.material_file import COLUMNS
+from roughvisc.study.study_file import PROGRAMS, SEGMENTS, TABLE_OF, unit_of
 from roughvisc.topography.conditioning import FACE_STEPS, STEPS
 from roughvisc.topography.recipes import RECIPES, surrogate
 
@@ -25,7 +26,15 @@ HEAD = ("key", "unit", "default", "meaning")
 #: Functions whose docstrings describe the arguments of others.
 _DESCRIBED_BY = {Settings: rv.simulate, SteadySliding: rv.friction, Numerics: Numerics}
 #: Keys that are not arguments of a function: unit, default, meaning.
-_FILE = ("", "none", "a CSV file with columns in place of the lists, relative to the study")
+_FILE = {
+    "file": ("", "none", "a table as exported, in place of the lists, relative to the study"),
+    "columns": ("", "none", "names of the columns in the file, with a unit that it lacks"),
+    "part": (
+        "",
+        "none",
+        "text of the line above the names of one step, in an export with several",
+    ),
+}
 _RECIPE = ("", "required", "the recipe: " + ", ".join(f"`{name}`" for name in RECIPES))
 _MODEL = ("", "required", "the model: " + ", ".join(f"`{name}`" for name in MODELS))
 _CONTROL = ("", "`load`", "what the values are: `load`, `approach` or `pressure`")
@@ -79,7 +88,7 @@ _EXTRA = {
         "leakage": ("", "none", "leak rate of a fluid through the gap"),
         "conductance": ("", "none", "conductance of the contact spots"),
     },
-    **{f"material: {model}": {"file": _FILE} for model in COLUMNS},
+    **{f"material: {model}": _FILE for model in COLUMNS},
 }
 
 
@@ -123,7 +132,7 @@ TABLES = {
         for name, one in RECIPES.items()
     },
     "material: any": ("material", _of(stiffened, modulus_factor="factor")),
-    **{f"material: {name}": ("material", _all(one)) for name, one in MODELS.items()},
+    **{f"material: {name}": ("material", _all(one, "note")) for name, one in MODELS.items()},
     "material: temperature": (
         "material",
         _of(rv.wlf, "temperature", "reference_temperature", "wlf_c1", "wlf_c2")
@@ -227,8 +236,13 @@ def rows(name):
             or unit_of(f"{above}.{key}").removeprefix("1")
             or units_of(function).get(argument, "").removeprefix("1")
         )
-        columns = COLUMNS.get(name.removeprefix("material: "), {})
-        default = "required, or `file`" if key in columns else _default(name, function, argument)
+        columns = COLUMNS.get(name.removeprefix("material: "), {}).values()
+        default = _default(name, function, argument)
+        if default == "required" and key in {
+            "frequency_unit",
+            *(argument for argument, _ in columns),
+        }:
+            default = "required, or `file`"
         found.append((key, unit, default, meaning(function, argument)))
     return found
 

@@ -17,12 +17,14 @@ from roughvisc.judge.trade import trade as trade
 from roughvisc.mechanics import closed_forms as closed_forms
 from roughvisc.mechanics.body import Body as Body
 from roughvisc.mechanics.layer import layer as layer
+from roughvisc.mechanics.materials.fractional import fractional_zener as fractional_zener
 from roughvisc.mechanics.materials.material import Prony as Prony
 from roughvisc.mechanics.materials.material import arrhenius as arrhenius
 from roughvisc.mechanics.materials.material import creep as creep
 from roughvisc.mechanics.materials.material import pair as pair
 from roughvisc.mechanics.materials.material import power_law as power_law
 from roughvisc.mechanics.materials.material import shift as shift
+from roughvisc.mechanics.materials.material import thermal as thermal
 from roughvisc.mechanics.materials.material import wlf as wlf
 from roughvisc.mechanics.materials.models import elastic as elastic
 from roughvisc.mechanics.materials.models import from_relaxation as from_relaxation
@@ -47,6 +49,7 @@ from roughvisc.study.case import read_cases as read_cases
 from roughvisc.study.case import read_study as read_study
 from roughvisc.study.case import vary as vary
 from roughvisc.study.machine_history import read_program as read_program
+from roughvisc.study.material_file import read_material as read_material
 from roughvisc.study.sweep_table import over_realisations as over_realisations
 from roughvisc.topography import example_scan as example_scan
 from roughvisc.topography.filters import fill as fill

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
 from roughvisc.paths import path_of, read_bytes
-from roughvisc.units import number
+from roughvisc.units import is_quantity, number
 
 #: Units of equal dimension that differ by 2 pi: never converted.
 FREQUENCY_UNITS = ("rad/s", "Hz")
@@ -256,18 +256,23 @@ def _between_blanks(line: str) -> list[str]:
 def _places(heading: Sequence[str], name: str) -> list[int]:
     """Return the positions of a column in a heading: by its full name, or else by its name without the unit.
 
-    Parentheses at the end of a name may belong to it, as in ``Height (measured)``.
+    A name in the same letters, upper or lower case, comes first: a table may have both ``t`` and ``T``. Parentheses at
+    the end of a name may belong to it, as in ``Height (measured)``.
     """
-    cells = [_plain(cell) for cell in heading]
-    bare = [name_and_unit(cell)[0] for cell in cells]
-    for names, wanted in ((cells, name), (bare, name), (bare, name_and_unit(name)[0])):
-        if places := [place for place, cell in enumerate(names) if cell == _plain(wanted)]:
-            return places
+    bare = [name_and_unit(cell)[0] for cell in heading]
+    for plain in (_single_blanks, _plain):
+        for names, wanted in ((heading, name), (bare, name), (bare, name_and_unit(name)[0])):
+            if places := [place for place, cell in enumerate(names) if plain(cell) == plain(wanted)]:
+                return places
     return []
 
 
+def _single_blanks(name: str) -> str:
+    return " ".join(name.split())
+
+
 def _plain(name: str) -> str:
-    return " ".join(name.split()).casefold()
+    return _single_blanks(name).casefold()
 
 
 def _no_heading(path: Path, rows: Sequence[_Row], separator: str, wanted: Mapping[str, Wanted]) -> InputError:
@@ -303,6 +308,291 @@ def _conversion(path: Path, line: int, names: Sequence[str], key: str, one: Want
         factor, zero = (1.0, 0.0) if unit == one.unit else (number(f"{n} {unit}", one.unit) for n in (1, 0))
     except InputError as error:
         raise error.prefixed(f"{path}: unit of {key}") from error
+    return _converter(unit, one.unit, factor, zero)
+
+
+def _converter(unit: str, wanted: str, factor: float, zero: float) -> Callable[[float], float]:
+    """Return the conversion of a number from a unit; `factor` and `zero` are 1 and 0 of this unit."""
     if zero:  # degrees Celsius count from 273.15 K
-        return lambda value: number(f"{value!r} {unit}", one.unit)
+        return lambda value: number(f"{value!r} {unit}", wanted)
     return lambda value: float(f"{value * factor:.15g}")
+
+
+# ----------------------------------------------------------------------------------------------------------------
+# exports of test machines
+
+
+class Export(NamedTuple):
+    """Columns of an export of a test machine.
+
+    Attributes
+    ----------
+    columns : dict of str to ndarray
+        Numbers by key, in the units wanted.
+    units : dict of str to str
+        Unit in the file by key.
+    lines : list of int
+        Line of each row.
+    note : str
+        Number of rows that are left out, and their lines; empty if there are none.
+    """
+
+    columns: dict[str, NDArray[np.float64]]
+    units: dict[str, str]
+    lines: list[int]
+    note: str
+
+
+#: Spellings of units that the registry of units lacks, or that mean another unit there.
+_SPELLINGS = {"C": "degC", "°C": "degC", "deg C": "degC", "K": "K", "-": "1", "[-]": "1", "sec": "s", "Sec": "s"}
+_SPELLINGS |= dict.fromkeys(("rad/sec", "rad s-1", "rad s^-1", "rad*s^-1", "rad·s⁻¹", "rad s⁻¹", "1/s·rad"), "rad/s")
+#: Kinds of units that test machines write.
+_KINDS_OF_UNITS = ("s", "1/s", "Pa", "1/Pa", "Pa s", "K", "m", "N")
+#: A cell that looks like a number, but not like a unit such as ``1/MPa``.
+_LIKE_A_NUMBER = re.compile(r"[+-]?[.,]?\d[^A-DF-Za-df-zµ°%/]*")
+#: Largest number of rows of units below the names, and of lines that a note lists.
+_UNIT_ROWS, _LISTED = 2, 6
+
+
+def read_export(path: str | Path, wanted: Mapping[str, Wanted], part: str | None = None) -> Export:
+    """Read columns of numbers from an export of a test machine.
+
+    Parameters
+    ----------
+    path : path
+        A text file as exported, with any preamble.
+    wanted : mapping of str to Wanted
+        Key of the column in messages and in the result -> column. The unit of a frequency is ``""``: it is Hz or rad/s
+        in the file, and is not converted.
+    part : str, optional
+        Text of the line above the names of one step, in an export with several.
+
+    Returns
+    -------
+    Export
+
+    Raises
+    ------
+    InputError
+        If the file or the part cannot be read, a column or its unit is missing, the file and the name state two units,
+        a cell is neither a number nor a text, or rows of another step follow. The message names the line.
+
+    Notes
+    -----
+    The heading is the first line with all names; a unit is part of a name, as ``f [Hz]``, or in one of two rows below
+    the names. Rows with an empty cell or a text in place of a number are left out, and so are repeated headings.
+    """
+    path = path_of(path, "path")
+    try:
+        text = read_text(path)
+    except UnicodeError as error:
+        raise InputError(f"{path}: cannot be read as a table: {error}") from error
+    lines = [(i, line.strip(" \r\n\ufeff")) for i, line in enumerate(text.splitlines(), 1) if line.strip()]
+    lines = lines if part is None else _below_part(path, lines, part)
+    above, separator, heading, places = _export_heading(path, lines, wanted)
+    table = _ExportTable(path, separator, heading, places)
+    table.read(lines[above + 1 :], has_part=part is not None)
+    if not table.rows:
+        where = f"{path}: holds no rows of numbers below the heading in line {lines[above][0]}"
+        raise InputError(f"{where}: expected {', '.join(wanted)}")
+    try:
+        mark = decimal_mark((cell for row in table.rows for cell in row), separator)
+    except InputError as error:
+        raise error.prefixed(str(path)) from None
+    columns: dict[str, NDArray[np.float64]] = {}
+    units: dict[str, str] = {}
+    for number_of_column, (key, place) in enumerate(places.items()):
+        units[key], convert = _export_unit(path, lines[above][0], key, wanted[key], heading[place], table.units[key])
+        values = []
+        for line, row in zip(table.lines, table.rows, strict=True):
+            value = float(plain_number(row[number_of_column], mark) or "nan")
+            if not math.isfinite(value):
+                where, expected = f"{path}, line {line}", f"a number for {key}"
+                cell = row[number_of_column]
+                raise InputError(f"{where}: found {cell!r}: expected {expected}", found=cell, expected=expected)
+            values.append(convert(value))
+        columns[key] = np.array(values)
+    note = ""
+    if table.left_out:
+        listed = ", ".join(map(str, table.left_out[:_LISTED])) + ", ..." * (len(table.left_out) > _LISTED)
+        note = f"{len(table.left_out)} rows without numbers left out of {path.name} (lines {listed})"
+    return Export(columns, units, table.lines, note)
+
+
+def _below_part(path: Path, lines: list[tuple[int, str]], part: str) -> list[tuple[int, str]]:
+    """Return the lines below the line with the text of a part."""
+    wanted = _plain(part)
+    words = re.compile(rf"(?<!\w){re.escape(wanted)}(?!\w)")
+    whole = []
+    within = []
+    for place, (_, line) in enumerate(lines):
+        cells = [_plain(cell) for cell in re.split("[\t;,]", line)]
+        if len(cells) > 1 and all(map(_EITHER.fullmatch, cells)):  # a row of numbers
+            continue
+        if wanted in (_plain(line), *cells):
+            whole.append(place)
+        elif wanted and words.search(_plain(line)):
+            within.append(place)
+    matches = whole or within
+    if len(matches) != 1:
+        numbers = ", ".join(str(lines[place][0]) for place in matches[:_LISTED])
+        where = f"{path} has it in lines {numbers}" if matches else f"{path} has no such line"
+        expected = "the text of one line above the names of a step"
+        raise InputError(
+            f"part: found {part!r}: {where}: expected {expected}", key="part", found=part, expected=expected
+        )
+    return lines[matches[0] + 1 :]
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    """Return the cells of a line between separators; two blanks mean names that may contain one."""
+    if separator.isspace() and separator != "\t":
+        return re.split(r"\s{2,}", line.strip()) if separator == "  " else _HEADING_BETWEEN_BLANKS.findall(line)
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
+
+
+def _export_heading(
+    path: Path, lines: list[tuple[int, str]], wanted: Mapping[str, Wanted]
+) -> tuple[int, str, list[str], dict[str, int]]:
+    """Return the place of the line of the names, the separator, the names, and the position of each wanted column."""
+    needed = [one.name for one in wanted.values() if not one.optional]
+    best: tuple[int, list[str], str] = (0, [], "")
+    for is_comment in (False, True):  # names may be in a comment
+        for above, (line, text) in enumerate(lines):
+            if text.startswith("#") != is_comment:
+                continue
+            for separator in ("\t", ";", ",", "  ", " "):
+                if separator not in text:
+                    continue
+                heading = _cells(text.lstrip("# "), separator)
+                missing = [name for name in needed if not _places(heading, name)]
+                if len(missing) < len(needed) and (not best[1] or len(missing) < len(best[1])):
+                    best = line, missing, text
+                if missing:
+                    continue
+                positions = {key: found for key, one in wanted.items() if (found := _places(heading, one.name))}
+                for key, found in positions.items():
+                    if len(found) > 1:
+                        names = ", ".join(heading[place] for place in found)
+                        raise InputError(
+                            f"{path}, line {line}: {key} = {wanted[key].name!r} fits the columns {names}: expected one"
+                        )
+                return above, separator, heading, {key: found[0] for key, found in positions.items()}
+    expected = f"a line with the names {', '.join(map(repr, needed))}"
+    found = f"found no {best[1][0]!r} in line {best[0]}, {best[2][:100]!r}" if best[1] else "found no such line"
+    raise InputError(f"{path}: {found}: expected {expected}", found=found, expected=expected)
+
+
+class _ExportTable:
+    """Rows of numbers below the names of an export, and rows of units."""
+
+    def __init__(self, path: Path, separator: str, heading: list[str], places: dict[str, int]) -> None:
+        self.path, self.separator, self.heading, self.places = path, separator, heading, places
+        self.rows: list[list[str]] = []
+        self.lines: list[int] = []
+        self.left_out: list[int] = []
+        self.units: dict[str, list[str]] = {key: [] for key in places}
+
+    def read(self, lines: list[tuple[int, str]], *, has_part: bool) -> None:
+        """Read the rows; with a part up to the end of this step, without one refuse the rows of another step."""
+        since_names, interrupted = 0, 0
+        for line, text in lines:
+            if text.startswith("#"):
+                continue
+            row, wanted = self._row(line, text)
+            is_number = [_EITHER.fullmatch(cell) is not None for cell in wanted]
+            is_like = [_LIKE_A_NUMBER.fullmatch(cell) is not None for cell in wanted]
+            since_names += 1
+            if all(is_number):
+                if interrupted:
+                    found = f"{self.path}, line {line}: rows of another step follow line {interrupted}"
+                    raise InputError(f"{found}: expected one step, named by part, the text of a line above its names")
+                if len(row) > len(self.heading) and any(row[len(self.heading) :]):
+                    found = f"found {len(row)} cells"
+                    raise InputError(
+                        f"{self.path}, line {line}: {found}: expected {len(self.heading)}, as in the names"
+                    )
+                self.rows.append(wanted)
+                self.lines.append(line)
+            elif any(is_like):
+                for cell, number_like, plain in zip(wanted, is_like, is_number, strict=True):
+                    if number_like and not plain and not interrupted:
+                        expected = "a number, without grouped digits and signs"
+                        where = f"{self.path}, line {line}"
+                        raise InputError(f"{where}: found {cell!r}: expected {expected}", found=cell, expected=expected)
+                self.left_out.append(line)
+            elif row == self.heading:
+                since_names, interrupted = 0, 0
+                self.left_out.append(line)
+            elif since_names <= _UNIT_ROWS and len(row) > max(self.places.values()):
+                for key, cell in zip(self.places, wanted, strict=True):
+                    self.units[key].append(cell.strip("[]() "))
+            elif self._is_text(row, wanted):
+                self.left_out.append(line)
+            elif self.rows:
+                interrupted = interrupted or line
+                if has_part:
+                    return
+
+    def _row(self, line: int, text: str) -> tuple[list[str], list[str]]:
+        """Return the cells of a line, and those of the wanted columns; missing ones are empty."""
+        row = text.split() if self.separator in (" ", "  ") else _cells(text, self.separator)
+        between_blanks = text.split()
+        if len(row) == 1 < len(between_blanks) == len(self.heading):  # names between tabs above numbers between blanks
+            row = between_blanks
+        if self.separator in (" ", "  ") and _cells(text, self.separator) == self.heading:
+            row = self.heading
+        return row, [row[place] if place < len(row) else "" for place in self.places.values()]
+
+    def _is_text(self, row: list[str], wanted: list[str]) -> bool:
+        """Return whether a line without numbers is a row of texts or of empty cells, and no names of another step."""
+        return len(row) > max(self.places.values()) and (
+            len(set(wanted)) == 1 or not any(letter.isalpha() for cell in wanted for letter in cell)
+        )
+
+
+def _export_unit(
+    path: Path, line: int, key: str, one: Wanted, name: str, below: Sequence[str]
+) -> tuple[str, Callable[[float], float]]:
+    """Return the unit of a column, and the conversion from it: stated with the name, below it, or by the user."""
+    title, given = name_and_unit(name)
+    if _plain(name) == _plain(one.name) or _plain(title) == _plain(one.name):
+        stated = ""
+    else:
+        stated = name_and_unit(one.name)[1]
+    where = f"{path}, line {line}: unit of {key}"
+    units: dict[str, str] = {}
+    for source, unit in [("name", given), *(("row below", cell) for cell in below), ("study", stated)]:
+        spelt = _SPELLINGS.get(unit, unit)
+        if spelt and _is_unit(spelt, one.unit):
+            units.setdefault(spelt, source)
+        elif spelt and source == "study":
+            expected = " or ".join(FREQUENCY_UNITS[::-1]) if not one.unit else f"a unit such as {one.unit}"
+            raise InputError(f"{where}: found {unit!r}: expected {expected}", found=unit, expected=expected)
+        elif spelt and source == "name" and (len(spelt) > 1 or "[" in name) and _is_known(spelt):
+            expected = f"a unit such as {one.unit or 'Hz'}"
+            raise InputError(f"{where}: found {name!r}: expected {expected}", found=name, expected=expected)
+    if len(units) > 1:
+        said = " and ".join(f"the {source} says {unit!r}" for unit, source in units.items())
+        raise InputError(f"{where}: {said}: expected one unit")
+    unit = next(iter(units), "1" if one.unit == "1" else "")
+    if not unit:
+        example = f"{title} [{one.unit or 'Hz'}]" + (" or [rad/s]" if not one.unit else "")
+        expected = f"the unit in the name of the column, {example!r}"
+        message = f"{path}, line {line}: found the column {name!r} without a unit: expected {expected}"
+        raise InputError(message, found=name, expected=expected)
+    if unit == one.unit or not one.unit:
+        return unit, float
+    return unit, _converter(unit, one.unit, *(number(f"{n} {unit}", one.unit) for n in (1, 0)))
+
+
+def _is_unit(unit: str, wanted: str) -> bool:
+    """Return whether a unit converts to the wanted one; a frequency is in Hz or in rad/s."""
+    if not wanted or wanted in FREQUENCY_UNITS:
+        return unit in FREQUENCY_UNITS
+    return is_quantity(f"1 {unit}", wanted) or unit == wanted == "1"
+
+
+def _is_known(unit: str) -> bool:
+    """Return whether a text is a unit that a test machine writes, of any kind."""
+    return any(is_quantity(f"1 {unit}", kind) for kind in _KINDS_OF_UNITS)

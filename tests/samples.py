@@ -26,9 +26,10 @@ OF_EACH_KIND = {
     "series": rv.Prony(0.5, 0.1, (2.0, 1.0), (0.3, 20.0), poisson=0.3),
     "bulk": rv.from_relaxation(1e6, [2e6], [0.1], bulk_modulus=2e9),
     "power law": rv.power_law(0.2, 1.5, 0.3, time_scale=4.0, poisson=0.4),
+    "fractional": rv.fractional_zener(4.0, 1.0, 0.5, 0.4, poisson=0.3),
     "pure power law": rv.power_law(0.0, 1.0, 0.7),
-    "table": rv.creep_table((0.0, 0.5, 2.0, 30.0, 1e3), (0.1, 0.4, 0.9, 1.1, 7.0), poisson=0.2),
-    "noisy table": rv.creep_table((0.5, 1.0, 30.0, 1e3), (1e-7, 2e-7, 1.99e-7, 8e-7), noise=0.1),
+    "table": rv.creep_table((0.0, 0.5, 2.0, 30.0, 1e3), (0.1, 0.4, 0.9, 1.1, 7.0), poisson=0.2, kind="shear"),
+    "noisy table": rv.creep_table((0.5, 1.0, 30.0, 1e3), (1e-7, 2e-7, 1.99e-7, 8e-7), noise=0.1, kind="shear"),
     "own": rv.creep(lambda t: 1.0 + np.log1p(t), poisson=0.1),
     "pair": rv.pair(rv.elastic(8e10, 0.3), RUBBER),
 }

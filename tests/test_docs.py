@@ -70,7 +70,8 @@ def there(tmp_path, monkeypatch):
     """The project's folder as a reader has it, with measured data."""
     shutil.copytree(ROOT / "surfaces", tmp_path / "surfaces")
     shutil.copytree(ROOT / "workflows", tmp_path / "workflows", ignore=shutil.ignore_patterns("results"))
-    for name, text in MEASURED.items():
+    shown = re.findall(r"`([\w.]+)`:\n\n```text\n(.*?)\n```", (DOCS / "howto" / "machine.md").read_text("utf-8"), re.S)
+    for name, text in [*MEASURED.items(), *shown]:
         (tmp_path / name).write_text(text, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     return tmp_path

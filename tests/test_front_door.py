@@ -52,7 +52,7 @@ def test_quantity__in_a_unit_of_another_kind_is_refused(call, key):
         call("1 kat")
 
 
-ROWS = {"times": [0.0, 1.0, 2.0], "poisson": 0.4}
+ROWS = {"times": [0.0, 1.0, 2.0], "kind": "shear", "poisson": 0.4}
 PRESS = rv.Program().load(1.0, over=1.0)
 SCENE = {"height": WAVE, "material": RUBBER, "progress": False}
 CALLS = [
@@ -67,7 +67,7 @@ CALLS = [
     (rv.creep_table, ROWS | {"compliances": [1e-6, 2e-6, 3e-6], "noise": 0.1}),
     (rv.relaxation_table, ROWS | {"moduli": [3e6, 2e6, 1e6]}),
     (
-        partial(rv.dynamic_table, frequency_unit="Hz"),
+        partial(rv.dynamic_table, frequency_unit="Hz", kind="shear"),
         {"frequencies": [1, 10], "storage": [1e6, 2e6], "loss": [1e5, 2e5], "shift_factors": 1.0, "poisson": 0.4},
     ),
     (rv.Program.table, {"times": [0], "values": [1]}),
@@ -111,7 +111,9 @@ def test_text__is_the_number():
     assert rv.sheet(RUBBER, "1 mm") == rv.sheet(RUBBER, 1e-3)
     assert rv.Prony("0.3 1/MPa", times=["1 min"], compliances=["1 1/MPa"]) == rv.Prony(3e-7, 0.0, (1e-6,), (60.0,))
     assert rv.power_law("0 1/Pa", "2 1/GPa", 0.3, "1 h") == rv.power_law(0.0, 2e-9, 0.3, 3600.0)
-    assert rv.creep_table(["1 ms", 1.0], ["1 1/MPa", 2e-6]) == rv.creep_table((1e-3, 1.0), (1e-6, 2e-6))
+    assert rv.creep_table(["1 ms", 1.0], ["1 1/MPa", 2e-6], kind="shear") == rv.creep_table(
+        (1e-3, 1.0), (1e-6, 2e-6), kind="shear"
+    )
     assert rv.from_relaxation("1 MPa", ["2 MPa"], ["10 ms"]) == rv.from_relaxation(1e6, [2e6], [0.01])
     assert rv.wlf("40 degC", "20 degC", 8.86, "101.6 K") == rv.wlf(313.15, 293.15, 8.86, 101.6)
     assert rv.closed_forms.hertz("1 mm", "4 MPa", "1 mN") == rv.closed_forms.hertz(1e-3, 4e6, 1e-3)

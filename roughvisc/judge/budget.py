@@ -30,7 +30,7 @@ from roughvisc.runs.netcdf import open_result
 from roughvisc.runs.run import is_result_of, result_folder
 from roughvisc.runs.sweep import run_cases
 from roughvisc.study.case import Case, case_given, vary
-from roughvisc.study.study_file import TEMPERATURE
+from roughvisc.study.study_file import shift_factor, split_thermal
 from roughvisc.topography.conditioning import FACE_STEPS
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.spectrum import is_narrow_band, last_octave
@@ -366,8 +366,8 @@ def sources_of(
     # the contact of an indenter has few cells, so changes of its material are solved on the grid of the case
     compared, material = coarse if sample else own, base.tables["material"]
     stiffer: dict[str, Any] = {"material.modulus_factor": _CHANGE * material.get("modulus_factor", 1.0)}
-    slower: dict[str, Any] = {f"material.{key}": None for key in TEMPERATURE if key in material}
-    slower["material.shift_factor"] = _CHANGE * base.shift_factor
+    slower: dict[str, Any] = {f"material.{key}": None for key in split_thermal(material)[0]}
+    slower["material.shift_factor"] = _CHANGE * shift_factor(material)
     creeps = base.material.contact_compliance(math.inf) > base.material.contact_compliance(0.0)
     for name, what, changes in ((MODULUS, "moduli", stiffer), (TIME_SCALE, "times of the material", slower)):
         key = f"{name.replace(' ', '_')}_error"

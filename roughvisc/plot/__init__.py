@@ -6,6 +6,7 @@ readable prefixes. Matplotlib's global state is not changed.
 
 from roughvisc.plot.curves import area_against_load, budget, friction, history, trade
 from roughvisc.plot.fields import animate, maps, section, surface
+from roughvisc.plot.master import master_curve
 from roughvisc.plot.sweep import sweep
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "friction",
     "history",
     "maps",
+    "master_curve",
     "section",
     "surface",
     "sweep",

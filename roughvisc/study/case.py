@@ -20,11 +20,12 @@ from roughvisc.errors import InputError, RoughviscError, short_repr
 from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
 from roughvisc.mechanics.body import Body
-from roughvisc.mechanics.materials.material import Material
+from roughvisc.mechanics.materials.material import Material, ThermalLaw
 from roughvisc.mechanics.program import Program
 from roughvisc.paths import path_of
 from roughvisc.settings import Settings
 from roughvisc.study.case_text import value_text
+from roughvisc.study.material_file import with_line
 from roughvisc.study.study_file import in_si, parts_of, shift_factor, unit_of, with_files, without_late_times
 from roughvisc.study.sweep_table import SURROGATE, place, sweep_changes, value_at
 from roughvisc.topography.conditioning import STEPS
@@ -104,7 +105,9 @@ class Case:
     @property
     def shift_factor(self) -> float:
         """Factor of all times of the material at its temperature. [-]"""
-        return shift_factor(self.tables["material"])
+        factor, law = shift_factor(self.tables["material"]), self.material.thermal
+        is_measured = "temperatures" in self.tables["material"] and isinstance(law, ThermalLaw)
+        return factor * law.shift(law.temperature) if is_measured else factor
 
     @property
     def program(self) -> Program:
@@ -361,14 +364,16 @@ def _case_of(
             tables, late = without_late_times(tables)
         case = Case(tables, origin, late_times=late, **parts_of(tables))
     except InputError as error:
+        named = error
         for key in (error.key, error.key.rpartition(".")[0]):
-            file = value_at(data, f"{key}.file", None)
-            if file is not None and key.startswith("material"):  # its columns have replaced its name in the table
-                raise error.prefixed(str(file)) from error
+            if key.startswith("material") and value_at(data, f"{key}.file", None) is not None:
+                # its columns have replaced its name in the table
+                named = with_line(error, in_si(value_at(data, key, {}), key, data, folder))
+                break
         text = value_at(data, error.key, None)
         if text == error.found or in_si(text, error.key, data, folder) != error.found:
-            raise
-        message = str(error).replace(repr(error.found), repr(text))
+            raise named from error
+        message = str(named).replace(repr(error.found), repr(text))
         raise type(error)(message, key=error.key, found=text, expected=error.expected) from error
     varied: dict[str, Any] = {}
     for key, value in changes.items():

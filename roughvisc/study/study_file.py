@@ -18,7 +18,19 @@ from typing import Any
 
 import numpy as np
 
-from roughvisc.arguments import a_table, call, check, located, one_key, one_of, refuse_unknown, split, suits, units_of
+from roughvisc.arguments import (
+    a_table,
+    arguments,
+    call,
+    check,
+    located,
+    one_key,
+    one_of,
+    refuse_unknown,
+    split,
+    suits,
+    units_of,
+)
 from roughvisc.errors import InputError
 from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
@@ -27,15 +39,15 @@ from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.layer import layer
 from roughvisc.mechanics.materials import MODELS
-from roughvisc.mechanics.materials.material import LARGEST_SHIFT, Material, arrhenius, shift, stiffened, wlf
+from roughvisc.mechanics.materials.material import LARGEST_SHIFT, Material, arrhenius, shift, stiffened, thermal, wlf
 from roughvisc.mechanics.program import UNITS, Program
 from roughvisc.mechanics.sheet import sheet
 from roughvisc.observables import OBSERVABLES
 from roughvisc.settings import Settings
 from roughvisc.study.machine_history import read_history
+from roughvisc.study.material_file import with_columns
 from roughvisc.study.properties import properties
 from roughvisc.study.sweep_table import value_at
-from roughvisc.tables import FREQUENCY_UNITS, Wanted, read_table
 from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.framing import combine
 from roughvisc.topography.recipes import RECIPES
@@ -67,18 +79,6 @@ _SOFTEST = 100.0
 #: Largest excess of a kept time over the end of a program, relative to the duration.
 _ROUNDING = 1e-12
 
-
-#: Columns of the CSV file of each model, by argument.
-COLUMNS: dict[str, dict[str, Wanted]] = {
-    "creep_table": {"times": Wanted("time", "s"), "compliances": Wanted("compliance", "1/Pa")},
-    "relaxation_table": {"times": Wanted("time", "s"), "moduli": Wanted("modulus", "Pa")},
-    "dynamic_table": {
-        "frequencies": Wanted("frequency", ""),  # in the argument frequency_unit
-        "storage": Wanted("storage", "Pa"),
-        "loss": Wanted("loss", "Pa"),
-        "shift_factors": Wanted("shift_factor", "1", optional=True),
-    },
-}
 
 # ----------------------------------------------------------------------------------------------------------------
 # units
@@ -222,28 +222,6 @@ def without_late_times(tables: Mapping[str, Any]) -> tuple[dict[str, Any], tuple
     return {**tables, "keep": {**tables["keep"], "times": kept}}, tuple(late)
 
 
-def with_columns(where: str, stated: Any) -> dict[str, Any]:
-    """Return a table of a material with the columns of its CSV file, without the name of the file."""
-    table = a_table(where, stated)
-    for key in ("a", "b", "on"):
-        if key in table:
-            table[key] = with_columns(f"{where}.{key}", table[key])
-    columns = COLUMNS.get(str(table.get("model")), {})
-    if not columns or "file" not in table:
-        return table
-    file = table.pop("file")
-    for key in columns.keys() & table.keys():
-        raise InputError(key=f"{where}.file", found=file, expected=f"either a file or {key}")
-    if "frequencies" in columns:
-        unit = one_of(f"{where}.frequency_unit", table.get("frequency_unit"), FREQUENCY_UNITS)
-        columns = columns | {"frequencies": columns["frequencies"]._replace(unit=unit)}
-    try:
-        found, _ = read_table(file, columns)
-    except InputError as error:
-        raise located(error, f"{where}.file") from error
-    return table | {key: values.tolist() for key, values in found.items()}
-
-
 def with_rows(where: str, stated: Any) -> Any:
     """Return a segment of a program with the rows of its file, without the name of the file."""
     table = stated.get("table") if isinstance(stated, Mapping) else None
@@ -324,21 +302,35 @@ def body_of(table: Mapping[str, Any], where: str = "material") -> Body:
 def material_of(table: Mapping[str, Any], where: str = "material") -> Material:
     """Return the material of a table, at its temperature."""
     model = one_of(f"{where}.model", table.get("model"), MODELS)
-    thermal, arguments = split(table, *TEMPERATURE)
-    scaling, arguments = split(arguments, "model", "modulus_factor")
+    stated, own = split_thermal(table)
+    scaling, own = split(own, "model", "modulus_factor")
     if model == "pair":
-        parts = split(arguments, "a", "b")[0]
-        arguments |= {key: material_of(a_table(f"{where}.{key}", one), f"{where}.{key}") for key, one in parts.items()}
-    material = call(MODELS[model], where, arguments)
-    factor = shift_factor(thermal, where)
-    material = material if factor == 1 else shift(material, factor)
+        parts = split(own, "a", "b")[0]
+        own |= {key: material_of(a_table(f"{where}.{key}", one), f"{where}.{key}") for key, one in parts.items()}
+    material = call(MODELS[model], where, own)
+    factor = shift_factor(stated, where)
+    if "temperature" in stated:
+        constants = split(stated, "temperature")[1]
+        material = call(thermal, where, constants, material).at(stated["temperature"])
+    elif factor != 1:
+        material = shift(material, factor)
     stiffer = number(scaling.get("modulus_factor", 1), "1", f"{where}.modulus_factor", above=0)
     return material if stiffer == 1 else stiffened(material, stiffer)
 
 
+def split_thermal(table: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the keys of a temperature that shift any model, and all other keys.
+
+    A temperature belongs to a model that takes one: to a table of measurements if its rows have temperatures.
+    """
+    known = arguments(MODELS[str(table["model"])]) if table.get("model") in MODELS else {}
+    belongs = "temperature" in known and ("temperatures" in table or "temperatures" not in known)
+    return split(table, *(name for name in TEMPERATURE if not (belongs and name in known)))
+
+
 def shift_factor(table: Mapping[str, Any], where: str = "material") -> float:
     """Return the factor of all times of a material at its temperature; 1 without a temperature."""
-    stated = split(table, *TEMPERATURE)[0]
+    stated = split_thermal(table)[0]
     if not stated:
         return 1.0
     key = "shift_factor" if "shift_factor" in stated else "temperature"

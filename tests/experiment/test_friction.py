@@ -103,7 +103,7 @@ ZENER, ROWS = rv.zener(1e6, 1e6, 1e3), np.append(0.0, np.geomspace(1e-6, 1.0, 12
         (rv.power_law(1e-7, 1e-6, 0.3), None, 1e-5),
         (rv.pair(ZENER, rv.maxwell(1e6, 1e3)), None, 1e-5),
         (rv.creep(lambda t: ZENER.creep_compliance(t)), ZENER, 1e-3),
-        (rv.creep_table(ROWS, ZENER.creep_compliance(ROWS)), ZENER, 1e-3),
+        (rv.creep_table(ROWS, ZENER.creep_compliance(ROWS), kind="shear"), ZENER, 1e-3),
         (rv.sheet(ZENER, 1.0), ZENER, 1e-5),
         (rv.sheet(rv.power_law(1e-7, 1e-6, 0.3, poisson=0.3), 2e-4), None, 1e-5),
     ],

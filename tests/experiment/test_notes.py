@@ -20,9 +20,9 @@ def press(material, **settings):
 def test_series__warns_of_a_table_far_from_any_passive_material():
     """Creep that gathers speed; noise within the stated noise is no reason."""
     times, rows = np.linspace(0.0, 1.0, 21), np.geomspace(1e-3, 10.0, 40)
-    gathering = rv.creep_table(times, 1e-6 * (1 + 20 * np.maximum(times - 0.3, 0)))
+    gathering = rv.creep_table(times, 1e-6 * (1 + 20 * np.maximum(times - 0.3, 0)), kind="shear")
     noise = 1 + 0.01 * np.random.default_rng(1).standard_normal(40)
-    noisy = rv.creep_table(rows, 1e-6 * rows**0.4 * noise, noise=0.1)
+    noisy = rv.creep_table(rows, 1e-6 * rows**0.4 * noise, noise=0.1, kind="shear")
     assert "no passive material" in warnings_of(press(gathering).attrs)["series"]
     for material, tolerance in ((gathering, 0.99), (noisy, 1e-2)):
         assert "series" not in warnings_of(press(material, tolerance=tolerance).attrs)

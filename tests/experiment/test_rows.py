@@ -15,7 +15,7 @@ MATERIALS = {
     "kelvin_voigt": rv.kelvin_voigt(1.0, 0.3),
     "power_law": rv.power_law(1.0, 1.0, 0.3),
     "own": rv.creep(lambda t: 1 + t / (1 + t)),
-    "table": rv.creep_table(ROWS, 1 + ROWS / (1 + ROWS)),
+    "table": rv.creep_table(ROWS, 1 + ROWS / (1 + ROWS), kind="shear"),
 }
 PROGRAMS = {
     "loads": rv.Program().load(0.02, over=0.3).hold(0.3).load(0.0, over=0.2).hold(0.2).load(0.01, over=0.2),

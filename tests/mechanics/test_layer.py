@@ -74,7 +74,7 @@ def test_layer__lies_on_another_one(thicknesses):
 def test_creep_functions_that_do_not_creep__are_elastic_layers():
     ball, press = rv.sphere(1e-3, 2e-4, 21), rv.Program().load(1e-4, over=0.1)
     # the table ends before the age at which the kernel is computed otherwise
-    constant = rv.creep_table((0.0, 0.05, 0.2), (1e-6, 1e-6, 1e-6)), rv.creep(lambda t: 1e-7 + 0 * t)
+    constant = rv.creep_table((0.0, 0.05, 0.2), (1e-6, 1e-6, 1e-6), kind="shear"), rv.creep(lambda t: 1e-7 + 0 * t)
     found = rv.simulate(ball, rv.layer(constant[0], 1e-4, on=constant[1]), press, progress=False)
     expected = rv.simulate(ball, rv.layer(rv.elastic(1e6), 1e-4, on=rv.elastic(1e7)), press, progress=False)
     assert float(found.approach[-1]) == pytest.approx(float(expected.approach[-1]), rel=1e-4)

@@ -253,3 +253,24 @@ def test_animate__refuses_what_it_cannot_write(tmp_path, monkeypatch):
     with refused("field", "height"):
         plot.animate(ds, tmp_path / "contact.gif", field="height")
     assert list(tmp_path.iterdir()) == []
+
+
+# ------------------------------------------------------------------------------------------------- master curves
+
+
+def test_master_curve__has_the_shifted_rows_on_the_line_of_the_material():
+    """A Maxwell element at three temperatures, in tension: every row lies on its moduli at the middle one."""
+    temperatures, omega = np.repeat([280.0, 290.0, 300.0], 12), np.tile(np.geomspace(0.3, 30.0, 12), 3)
+    x = omega * np.repeat([10.0, 1.0, 0.1], 12)
+    storage, loss = 3e6 * (1 + x**2 / (1 + x**2)), 3e6 * x / (1 + x**2)
+    keys = {"frequency_unit": "rad/s", "kind": "tensile", "temperatures": temperatures, "vertical": "none"}
+    figure = plot.master_curve(rv.dynamic_table(omega, storage, loss, temperature="12 degC", **keys))
+    curve, shifts, _ = figure.axes
+    for points, line, exact in zip(curve.collections, curve.lines, (storage, loss), strict=True):
+        at, moduli = np.ma.getdata(points.get_offsets()).T
+        assert np.log10(at) == pytest.approx(np.log10(x), abs=0.02)
+        assert moduli == pytest.approx(1e-3 * exact)  # kPa
+        assert np.interp(np.log(at), np.log(line.get_xdata()), line.get_ydata()) == pytest.approx(moduli, rel=0.05)
+    assert np.ma.getdata(shifts.collections[-1].get_offsets())[:, 1] == pytest.approx([1, 0, -1], abs=0.02)
+    with refused("material"):
+        plot.master_curve(rv.elastic(1e6))

@@ -118,7 +118,7 @@ def _table(rng, unit, span):
     values *= unit * (1 + rng.uniform(0, 0.03) * np.clip(rng.standard_normal(times.size), -3, 3))
     if rng.random() < 0.5:
         times, values = np.append(0.0, times), np.append(rng.uniform(0.5, 1) * values.min(), values)
-    return rv.creep_table(tuple(times), tuple(values), noise=0.25, poisson=rng.uniform(0, 0.5))
+    return rv.creep_table(tuple(times), tuple(values), noise=0.25, poisson=rng.uniform(0, 0.5), kind="shear")
 
 
 def _bulk(rng, unit, span):

@@ -11,7 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import partial
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,6 +29,9 @@ Array = NDArray[np.float64]
 LARGEST_SHIFT = 1e30
 #: Largest relative growth of a creep compliance that has settled.
 _SETTLED = 1e-9
+#: Notes of a material with other times, and with other moduli.
+_SHIFTED = "all times multiplied by {:.6g} (time-temperature shift)"
+_STIFFENED = "all moduli multiplied by {:.6g}"
 #: Decimal logarithm of the largest factor of WLF and Arrhenius.
 _LARGEST = 300.0
 
@@ -38,13 +42,15 @@ def check_poisson(poisson: float) -> None:
     number(poisson, "1", "poisson", above=-1, most=0.5)
 
 
-def check_terms(name: str, terms: Sequence[float], unit: str, times: Sequence[float]) -> None:
+def check_terms(
+    name: str, terms: Sequence[float], unit: str, times: Sequence[float], name_of_times: str = "times"
+) -> None:
     """Refuse terms of a series that are negative, or fewer or more than their times, which are positive."""
     if len(terms) != len(times):
-        raise InputError(key=name, found=len(terms), expected=f"as many as times, {len(times)}")
+        raise InputError(key=name, found=len(terms), expected=f"as many as {name_of_times}, {len(times)}")
     for i, (term, time) in enumerate(zip(terms, times, strict=True)):
         number(term, unit, f"{name}[{i}]", least=0)
-        number(time, "s", f"times[{i}]", above=0)
+        number(time, "s", f"{name_of_times}[{i}]", above=0)
 
 
 @quantities(glassy="1/Pa >= 0", fluidity="1/(Pa s) >= 0", compliances="1/Pa ...", times="s ...")
@@ -74,6 +80,8 @@ class Prony:
         Warning about the measurements, for the result.
     misfit : float
         Largest relative deviation from the rows of a creep table, zero if it is within their noise.
+    thermal : ThermalLaw or PairLaw
+        Law by which the material changes with temperature, if it has one; :meth:`at` uses it.
 
     Raises
     ------
@@ -92,6 +100,7 @@ class Prony:
     longest: float = field(default=math.inf, repr=False)
     warning: str = field(default="", compare=False, repr=False)
     misfit: float = field(default=0.0, compare=False, repr=False)
+    thermal: ThermalLaw | PairLaw | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "compliances", tuple(map(float, self.compliances)))
@@ -123,6 +132,11 @@ class Prony:
         """Shear compliance after endless creep, infinite for a fluid. [1/Pa]"""
         return math.inf if self.fluidity else self.glassy + sum(self.compliances)
 
+    @property
+    def is_solid(self) -> bool:
+        """Whether endless creep ends at a finite compliance."""
+        return not self.fluidity
+
     def laplace(self, s: NDArray[Any]) -> NDArray[Any]:
         """Return the shear compliance under a pressure that grows as ``exp(s t)``. [1/Pa]
 
@@ -141,6 +155,10 @@ class Prony:
             found = found + compliance / (1 + s * time)
         return np.asarray(found)
 
+    def at(self, temperature: Quantity) -> Material:
+        """Return the material at another temperature [K], see :func:`at_temperature`."""
+        return at_temperature(self, temperature)
+
     def scaled(self, time_factor: float, modulus_factor: float, note: str = "") -> Prony:
         """Return the series with all times multiplied by one factor and all moduli by another."""
         return replace(
@@ -151,6 +169,7 @@ class Prony:
             times=tuple(time_factor * one for one in self.times),
             longest=time_factor * self.longest,
             note="; ".join(filter(None, (self.note, note))),
+            thermal=self.thermal and self.thermal.scaled(time_factor, modulus_factor),
         )
 
 
@@ -198,6 +217,8 @@ class Creep:
         Poisson ratio, constant in time.
     time_factor, modulus_factor : float
         Factors of all times and of all moduli. [-]
+    transform : callable, optional
+        ``transform(s, *parameters)`` returns ``s`` times the Laplace transform of ``J`` [1/Pa] at rates ``s`` [1/s].
     note : str
         Origin of the material.
     warning : str
@@ -206,6 +227,8 @@ class Creep:
         Largest deviation from measurements, of a pair with a measured body.
     stands_for : str
         Name of the bodies if the function is not one body with this Poisson ratio; otherwise empty.
+    thermal : ThermalLaw or PairLaw
+        Law by which the material changes with temperature, if it has one; :meth:`at` uses it.
     """
 
     function: Callable[..., Any]
@@ -213,10 +236,12 @@ class Creep:
     poisson: float = 0.5
     time_factor: float = 1.0
     modulus_factor: float = 1.0
+    transform: Callable[..., Any] | None = field(default=None, repr=False)
     note: str = field(default="", compare=False)
     warning: str = field(default="", compare=False)
     misfit: float = field(default=0.0, compare=False)
     stands_for: str = field(default="", compare=False)
+    thermal: ThermalLaw | PairLaw | None = field(default=None, compare=False)
 
     def __repr__(self) -> str:
         return f"{self.function.__name__}({', '.join(map(repr, self.parameters))})"
@@ -253,13 +278,18 @@ class Creep:
 
     @property
     def has_laplace(self) -> bool:
-        """Whether :meth:`laplace` is known."""
+        """Whether :meth:`laplace` is known: of both bodies, if the material is a pair."""
         if self.function is pair_creep:
             return all(not isinstance(body, Creep) or body.has_laplace for body in self.parameters)
-        return self.function is power_creep
+        return self.transform is not None
+
+    @property
+    def is_solid(self) -> bool:
+        """Whether endless creep ends at a finite compliance."""
+        return math.isfinite(self.final_compliance)
 
     def laplace(self, s: NDArray[Any]) -> NDArray[Any]:
-        """Return the shear compliance of a power law or a pair under a pressure that grows as ``exp(s t)``. [1/Pa]
+        """Return the shear compliance under a pressure that grows as ``exp(s t)``. [1/Pa]
 
         Parameters
         ----------
@@ -274,15 +304,17 @@ class Creep:
         Raises
         ------
         InputError
-            If the function is another one: its transform is not known.
+            If the material has no transform.
         """
-        if not self.has_laplace:
-            raise InputError(key="material", found=self, expected="a series or a power law, with a known transform")
         if self.function is pair_creep:
             return np.asarray(sum(2 * (1 - body.poisson) * body.laplace(s) for body in self.parameters))
-        glassy, coefficient, exponent, time_scale = self.parameters
-        crept = coefficient * math.gamma(1 + exponent) * (s * (self.time_factor * time_scale)) ** -exponent
-        return np.asarray((glassy + crept) / self.modulus_factor)
+        if self.transform is None:
+            raise InputError(key="material", found=self, expected="a material with a known transform, such as a series")
+        return np.asarray(self.transform(s * self.time_factor, *self.parameters) / self.modulus_factor)
+
+    def at(self, temperature: Quantity) -> Material:
+        """Return the material at another temperature [K], see :func:`at_temperature`."""
+        return at_temperature(self, temperature)
 
     def scaled(self, time_factor: float, modulus_factor: float, note: str = "") -> Material:
         """Return the material with all times multiplied by one factor and all moduli by another."""
@@ -291,14 +323,72 @@ class Creep:
             a, b = (one.scaled(time_factor, modulus_factor) for one in self.parameters)
             return replace(pair(a, b), note=note)
         factors = time_factor * self.time_factor, modulus_factor * self.modulus_factor
-        return replace(self, time_factor=factors[0], modulus_factor=factors[1], note=note)
+        thermal = self.thermal and self.thermal.scaled(time_factor, modulus_factor)
+        return replace(self, time_factor=factors[0], modulus_factor=factors[1], note=note, thermal=thermal)
 
 
 #: The two kinds of materials.
 Material = Prony | Creep
 
 
-def creep(function: Callable[[Array], Any], poisson: float = 0.5) -> Creep:
+@dataclass(frozen=True)
+class ThermalLaw:
+    """Change of a material with temperature: one factor for all times, and one for all moduli.
+
+    Parameters
+    ----------
+    material : Prony or Creep
+        Material at the reference temperature.
+    temperature : float
+        Temperature of the material that has this law. [K]
+    shift : callable
+        Shift factor ``a_T`` at a temperature [K], relative to the reference. It refuses temperatures out of range.
+    moduli : callable, optional
+        Factor of all moduli at a temperature [K]. Default: they do not change.
+    """
+
+    material: Material
+    temperature: float
+    shift: Callable[[float], float]
+    moduli: Callable[[float], float] | None = None
+
+    def at(self, temperature: float) -> Material:
+        """Return the material at a temperature, with this law. [K]"""
+        factor, stiffer = self.shift(temperature), self.moduli(temperature) if self.moduli else 1.0
+        if not 1 / LARGEST_SHIFT <= factor <= LARGEST_SHIFT:
+            expected = f"a shift of times by a factor from {1 / LARGEST_SHIFT:g} to {LARGEST_SHIFT:g}, not {factor!r}"
+            raise InputError(key="temperature", found=temperature, expected=expected)
+        notes = [_SHIFTED.format(factor)] * (factor != 1) + [_STIFFENED.format(stiffer)] * (stiffer != 1)
+        material = self.material.scaled(factor, stiffer, "; ".join(notes))
+        return replace(material, thermal=replace(self, temperature=temperature))
+
+    def scaled(self, time_factor: float, modulus_factor: float) -> Self:
+        """Return the law of the material with all times multiplied by one factor and all moduli by another."""
+        return replace(self, material=self.material.scaled(time_factor, modulus_factor))
+
+
+@dataclass(frozen=True)
+class PairLaw:
+    """Change of a pair with temperature: both bodies change by their own law, and an elastic body does not change."""
+
+    a: Material
+    b: Material
+
+    def at(self, temperature: float) -> Material:
+        """Return the pair with both bodies at a temperature. [K]"""
+        elastic = [isinstance(one, Prony) and not one.fluidity and not one.times for one in (self.a, self.b)]
+        bodies = (self.a, self.b)
+        changed = [one if fixed else one.at(temperature) for one, fixed in zip(bodies, elastic, strict=True)]
+        return pair(*changed)
+
+    def scaled(self, time_factor: float, modulus_factor: float) -> PairLaw:
+        """Return the law of the pair with all times multiplied by one factor and all moduli by another."""
+        return PairLaw(*(one.scaled(time_factor, modulus_factor) for one in (self.a, self.b)))
+
+
+def creep(
+    function: Callable[[Array], Any], poisson: float = 0.5, *, laplace: Callable[[NDArray[Any]], Any] | None = None
+) -> Creep:
     """Material by its shear creep compliance.
 
     Parameters
@@ -308,6 +398,9 @@ def creep(function: Callable[[Array], Any], poisson: float = 0.5) -> Creep:
         at an infinite time: a finite value makes the material a solid with this compliance after endless creep.
     poisson : float
         Poisson ratio, constant in time.
+    laplace : callable, optional
+        ``s`` times the Laplace transform of ``J``, [1/Pa], for an array of real or complex rates ``s`` [1/s]. With it
+        friction and layers need no fitted series.
 
     Returns
     -------
@@ -316,7 +409,7 @@ def creep(function: Callable[[Array], Any], poisson: float = 0.5) -> Creep:
     Raises
     ------
     InputError
-        If the function cannot be called, or a number is out of its range.
+        If a function cannot be called, or a number is out of its range.
 
     Examples
     --------
@@ -328,8 +421,10 @@ def creep(function: Callable[[Array], Any], poisson: float = 0.5) -> Creep:
     """
     if not callable(function):
         raise InputError(key="function", found=function, expected="a function of time, the creep compliance [1/Pa]")
+    if laplace is not None and not callable(laplace):
+        raise InputError(key="laplace", found=laplace, expected="a function of the rate, the compliance [1/Pa]")
     check_poisson(poisson)
-    return Creep(function, (), poisson)
+    return Creep(function, (), poisson, transform=laplace)
 
 
 @quantities(glassy="1/Pa >= 0", coefficient="1/Pa > 0", exponent="1 > 0", time_scale="s > 0")
@@ -368,7 +463,14 @@ def power_law(
     """
     check_poisson(poisson)
     number(exponent, "1", "exponent", above=0, below=1)
-    return Creep(power_creep, (glassy, coefficient, exponent, time_scale), poisson)
+    return Creep(power_creep, (glassy, coefficient, exponent, time_scale), poisson, transform=power_transform)
+
+
+def power_transform(
+    s: NDArray[Any], glassy: float, coefficient: float, exponent: float, time_scale: float
+) -> NDArray[Any]:
+    """Return the shear compliance of a power law under a pressure that grows as ``exp(s t)``. [1/Pa]"""
+    return np.asarray(glassy + coefficient * math.gamma(1 + exponent) * (s * time_scale) ** -exponent)
 
 
 def power_creep(t: Array, glassy: float, coefficient: float, exponent: float, time_scale: float) -> Array:
@@ -407,6 +509,8 @@ def pair(a: Material, b: Material) -> Material:
         "warning": " ".join(filter(None, (body.warning for body in bodies))),
         "misfit": max(body.misfit for body in bodies),
     }
+    if a.thermal or b.thermal:
+        about["thermal"] = PairLaw(a, b)
     if not (isinstance(a, Prony) and isinstance(b, Prony)):
         return Creep(pair_creep, bodies, **about)
     glassy, fluidity = 0.0, 0.0
@@ -543,8 +647,84 @@ def shift(material: Material, factor: float) -> Material:
     3e-06
     """
     factor = number(factor, "1", "factor", least=1 / LARGEST_SHIFT, most=LARGEST_SHIFT)
-    note = f"all times multiplied by {factor:.6g} (time-temperature shift)"
-    return check_material(material).scaled(factor, 1.0, note)
+    return check_material(material).scaled(factor, 1.0, _SHIFTED.format(factor))
+
+
+@quantities(reference_temperature="K > 0", activation_energy="J/mol > 0", wlf_c1="1 > 0")
+def thermal(
+    material: Material,
+    reference_temperature: Quantity,
+    *,
+    wlf_c1: float | None = None,
+    wlf_c2: float | str | None = None,
+    activation_energy: Quantity | None = None,
+) -> Material:
+    """Give a material its law of temperature, so that ``material.at("40 degC")`` is the material at 40 degC.
+
+    Parameters
+    ----------
+    material : Prony or Creep
+        Material at its reference temperature.
+    reference_temperature : float or str
+        Temperature at which the compliance was measured. [K]
+    wlf_c1, wlf_c2 : float or str
+        Constants of :func:`wlf`. [-], [K]
+    activation_energy : float or str
+        Constant of :func:`arrhenius`, instead. [J/mol]
+
+    Returns
+    -------
+    Prony or Creep
+        The same material at its reference temperature, with the law.
+
+    Raises
+    ------
+    InputError
+        If a number is wrong, or the law is not stated by either `wlf_c1` and `wlf_c2` or `activation_energy`.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rubber = rv.thermal(rv.maxwell(1e6, 1e6), "20 degC", wlf_c1=8.0, wlf_c2=90.0)
+    >>> warm = rubber.at("30 degC")  # log10 a = -8 * 10 / 100
+    >>> round(rubber.fluidity / warm.fluidity, 4)
+    0.1585
+    """
+    constants: dict[str, Any] = {"wlf_c1": wlf_c1, "wlf_c2": wlf_c2}
+    for key, value in constants.items():
+        if (value is None) == (activation_energy is None):
+            raise InputError(key=key, found=value, expected="either wlf_c1 and wlf_c2 or activation_energy")
+    function, constants = (
+        (wlf, constants) if activation_energy is None else (arrhenius, {"activation_energy": activation_energy})
+    )
+    law = partial(function, reference_temperature=reference_temperature, **constants)
+    law(reference_temperature)  # refuses wrong constants
+    material = replace(check_material(material), thermal=None)
+    return replace(material, thermal=ThermalLaw(material, reference_temperature, law))
+
+
+def at_temperature(material: Material, temperature: Quantity) -> Material:
+    """Return a material at another temperature, by its own law.
+
+    Parameters
+    ----------
+    material : Prony or Creep
+        A material with a law: from :func:`thermal`, from a table with several temperatures, or from a study with a
+        temperature. Both bodies of a pair are brought to the temperature; an elastic body does not change.
+    temperature : float or str
+        The temperature. [K]
+
+    Raises
+    ------
+    InputError
+        If the material has no law, or the temperature is outside the range of the law.
+    """
+    temperature = number(temperature, "K", "temperature", above=0)
+    law = check_material(material).thermal
+    if law is None:
+        expected = "a material with a law of temperature: rv.thermal(material, ...), or a table with temperatures"
+        raise InputError(key="material", found=material, expected=expected)
+    return law.at(temperature)
 
 
 def stiffened(material: Material, factor: float) -> Material:
@@ -574,7 +754,7 @@ def stiffened(material: Material, factor: float) -> Material:
     5e-07
     """
     factor = number(factor, "1", "modulus_factor", above=0)
-    return check_material(material).scaled(1.0, factor, f"all moduli multiplied by {factor:.6g}")
+    return check_material(material).scaled(1.0, factor, _STIFFENED.format(factor))
 
 
 def check_material(material: Any, key: str = "material") -> Material:

@@ -161,6 +161,8 @@ def zener(shear_modulus: Quantity, kelvin_modulus: Quantity, kelvin_viscosity: Q
     instantaneous="Pa > 0",
     ratios="1 ...",
     bulk_modulus="Pa > 0",
+    bulk_ratios="1 ...",
+    bulk_times="s ...",
 )
 def from_relaxation(
     equilibrium: Quantity | None = None,
@@ -172,16 +174,18 @@ def from_relaxation(
     ratios: Sequence[float] = (),
     kind: Kind = "shear",
     bulk_modulus: Quantity | None = None,
+    bulk_ratios: Sequence[float] = (),
+    bulk_times: Sequence[Quantity] = (),
 ) -> Prony:
     r"""Generalised Maxwell solid, ``G(t) = G_e + sum G_i exp(-t / theta_i)``.
 
     Papers and finite-element codes also use ``G(t) = G_0 [1 - sum g_i (1 - exp(-t / theta_i))]``, with the
-    instantaneous modulus and ratios.
+    instantaneous or the long-term modulus and ratios, and the same series for the bulk modulus.
 
     Parameters
     ----------
     equilibrium : float or str
-        ``G_e``; exactly zero makes a fluid. [Pa]
+        ``G_e``, the long-term modulus; exactly zero makes a fluid. [Pa]
     moduli, times : sequence of float or str
         ``G_i`` [Pa] and relaxation times ``theta_i`` [s].
     poisson : float
@@ -189,11 +193,14 @@ def from_relaxation(
     instantaneous : float or str
         ``G_0``, instead of `equilibrium`. [Pa]
     ratios : sequence of float
-        ``g_i = G_i / G_0``, instead of `moduli`; a sum of one makes a fluid. [-]
+        ``g_i = G_i / G_0``, instead of `moduli`; a sum of one makes a fluid, which needs `instantaneous`. [-]
     kind : {"shear", "tensile"}
         Whether the moduli are shear moduli or Young's moduli, ``E = 2 G (1 + nu)``.
     bulk_modulus : float or str
-        Elastic bulk modulus ``K``, instead of a Poisson ratio. [Pa]
+        Bulk modulus ``K``, instead of a Poisson ratio: elastic; or, with `bulk_ratios`, instantaneous if
+        `instantaneous` is given, else long-term. [Pa]
+    bulk_ratios, bulk_times : sequence of float or str
+        Ratios ``k_i`` [-] and times [s] of the relaxing bulk modulus, for shear moduli.
 
     Returns
     -------
@@ -204,8 +211,8 @@ def from_relaxation(
     ------
     InputError
         If a modulus is negative, a time is not positive, or their numbers differ; if all moduli are zero; if the ratios
-        exceed one in sum, or are given as moduli; if a bulk modulus is given with a Poisson ratio, or is below a ninth
-        of Young's modulus.
+        exceed one in sum, reach one with a long-term modulus, or are given as moduli; if a bulk modulus is given with a
+        Poisson ratio, or is below a ninth of Young's modulus; if bulk ratios are given with Young's moduli.
 
     Examples
     --------
@@ -217,38 +224,66 @@ def from_relaxation(
         key = "equilibrium" if instantaneous is None else "instantaneous"
         raise InputError(key=key, found=instantaneous, expected="either equilibrium or instantaneous")
     if len(moduli) and len(ratios):
-        raise InputError(key="ratios", found=ratios, expected="moduli with equilibrium, or ratios with instantaneous")
+        raise InputError(key="ratios", found=ratios, expected="either moduli or ratios")
     plateau: Any = equilibrium
-    if instantaneous is None:
+    if instantaneous is None and not len(ratios):
         check_terms("moduli", moduli, "Pa", times)
     else:
-        check_terms("ratios", ratios, "1", times)
-        rest = 1 - math.fsum(ratios)
-        if rest < -_ONE:
-            raise InputError(key="ratios", found=ratios, expected=f"ratios with a sum of at most 1, not {1 - rest:g}")
-        plateau, moduli = instantaneous * (rest if rest > _ONE else 0.0), [instantaneous * one for one in ratios]
+        plateau, moduli = _from_ratios("ratios", equilibrium, instantaneous, ratios, times)
     if len(moduli) and 0 < max(moduli) <= 1 and sum(moduli) < _RATIOS * plateau:
         raise InputError(key="moduli", found=moduli, expected="moduli [Pa]; for ratios, instantaneous= and ratios=")
     if bulk_modulus is not None and poisson is not None:
         raise InputError(key="bulk_modulus", found=bulk_modulus, expected="either poisson or bulk_modulus")
+    if bulk_modulus is None and (len(bulk_ratios) or len(bulk_times)):
+        raise InputError(key="bulk_ratios", found=bulk_ratios, expected="a bulk_modulus")
     constant = 0.5 if poisson is None else poisson
     factor = tensile_to_shear(kind, constant)
     if bulk_modulus is None:
         return relaxation_series(plateau / factor, [one / factor for one in moduli], times, constant)
-    return _with_elastic_bulk(plateau, moduli, times, bulk_modulus, kind)
+    if not len(bulk_ratios) and not len(bulk_times):
+        return _with_bulk(plateau, moduli, times, bulk_modulus, kind)
+    if kind == "tensile":
+        raise InputError(key="bulk_ratios", found=bulk_ratios, expected='shear moduli, kind = "shear"')
+    final, first = (None, bulk_modulus) if equilibrium is None else (bulk_modulus, None)
+    in_the_end, bulk_moduli = _from_ratios("bulk_ratios", final, first, bulk_ratios, bulk_times)
+    return _with_bulk(plateau, moduli, times, in_the_end, kind, bulk_moduli, bulk_times)
 
 
-def _with_elastic_bulk(
-    equilibrium: float, moduli: Sequence[float], times: Sequence[float], bulk_modulus: float, kind: Kind
+def _from_ratios(
+    name: str, equilibrium: Any, instantaneous: Any, ratios: Sequence[float], times: Sequence[Any]
+) -> tuple[float, list[float]]:
+    """Return the long-term modulus and the moduli of a series given by ratios to its instantaneous modulus. [Pa]"""
+    check_terms(name, ratios, "1", times, name.replace("ratios", "times"))
+    rest = 1 - math.fsum(ratios)
+    if rest < -_ONE:
+        raise InputError(key=name, found=ratios, expected=f"ratios with a sum of at most 1, not {1 - rest:g}")
+    rest = rest if rest > _ONE else 0.0
+    if instantaneous is None:
+        if not rest or not equilibrium:
+            raise InputError(
+                key=name, found=ratios, expected="a sum below 1 and a positive equilibrium, or instantaneous"
+            )
+        return equilibrium, [equilibrium / rest * one for one in ratios]
+    return instantaneous * rest, [instantaneous * one for one in ratios]
+
+
+def _with_bulk(
+    equilibrium: float,
+    moduli: Sequence[float],
+    times: Sequence[float],
+    bulk_modulus: float,
+    kind: Kind,
+    bulk_moduli: Sequence[float] = (),
+    bulk_times: Sequence[float] = (),
 ) -> Prony:
-    r"""Return the series with the contact compliance of a relaxing material with an elastic bulk modulus ``K``.
+    r"""Return the series with the contact compliance of a material that relaxes in shear and in volume.
 
     Notes
     -----
     In the transformed domain the contact compliance is :math:`\tfrac14 [1/G + 3/(3K + G)]`, or in terms of Young's
     modulus :math:`3/(4E) + 1/(6K) - E/(36K^2)`. The series has four times this at a Poisson ratio of a half. The
     second term is the creep compliance of the relaxation modulus ``3K + G(t)``, which vanishes for an incompressible
-    material; the last is a sum of exponentials with the relaxation times.
+    material; the last is a sum of exponentials with the relaxation times. The bulk modulus is elastic, or a series.
     """
     found = relaxation_series(equilibrium, moduli, times)
     if kind == "tensile":
@@ -259,11 +294,14 @@ def _with_elastic_bulk(
         found = found.scaled(1.0, 1 / 3)
         glassy, later = found.glassy * (1 - part) * (1 + 3 * part), [one / (9 * bulk_modulus**2) for one in moduli]
     else:
-        volume = relaxation_series(3 * bulk_modulus + equilibrium, moduli, times)
+        terms_of_both = [*moduli, *(3 * one for one in bulk_moduli)]
+        volume = relaxation_series(3 * bulk_modulus + equilibrium, terms_of_both, [*times, *bulk_times])
         glassy, later, times = found.glassy + 3 * volume.glassy, [3 * one for one in volume.compliances], volume.times
     terms = (*found.compliances, *later), (*found.times, *times)
-    note = f"effective compliance for an elastic bulk modulus of {bulk_modulus:g} Pa"
-    stands_for = "a body with an elastic bulk modulus, whose Poisson ratio changes in time"
+    elastic_or_not = "a relaxing" if len(bulk_moduli) else "an elastic"
+    final = " in the end" if len(bulk_moduli) else ""
+    note = f"effective compliance for {elastic_or_not} bulk modulus of {bulk_modulus:g} Pa{final}"
+    stands_for = f"a body with {elastic_or_not} bulk modulus, whose Poisson ratio changes in time"
     return Prony(glassy, found.fluidity, *terms, note=note, stands_for=stands_for)
 
 

@@ -5,8 +5,8 @@ error. The terms of a series are positive, so that it is a passive material. It 
 material, so that jumps are exact. Both compliances increase. Before the shortest time they therefore differ by less
 than the creep up to this time.
 
-Under oscillating pressure a material has a complex compliance. Series and power laws have it in closed form. Any other
-material is replaced by a certified series.
+Under oscillating pressure a material has a complex compliance. Some materials have it in closed form. Any other one
+is replaced by a certified series.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ def series(
         return material, 0.0
     instants = _instants(shortest, longest, _MEASURED)
     compliance = check_creep(material, instants)
-    if until_end and math.isfinite(material.final_compliance):
+    if until_end and material.is_solid:
         instants, compliance = np.append(instants, math.inf), np.append(compliance, material.final_compliance)
     if isinstance(material, Creep) and material.function is pair_creep:
         joined = cast(Prony, pair(*(series(one, shortest, longest, tolerance)[0] for one in material.parameters)))
@@ -220,7 +220,7 @@ def complex_compliance(material: Material, frequency: ArrayLike) -> NDArray[np.c
     Parameters
     ----------
     material : Material
-        Series, power laws and pairs of these have closed forms. Any other material is replaced by a series, see
+        Series and materials with a transform have closed forms. Any other material is replaced by a series, see
         :func:`over_frequencies`.
     frequency : array_like
         Angular frequencies ``w``, of either sign. [1/s]
@@ -271,7 +271,7 @@ def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float 
     Parameters
     ----------
     material : Material
-        Series, power laws and pairs of these are returned unchanged. Measured creep is replaced by the series fitted
+        Series and materials with a transform are returned unchanged. Measured creep is replaced by the series fitted
         to it, any other material by a certified series.
     frequency : array_like
         Angular frequencies, of either sign. [1/s]
@@ -291,6 +291,6 @@ def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float 
     shortest, longest = 1 / (_BEYOND * float(size.max())), _BEYOND / float(size[size > 0].min())
     if isinstance(material, Creep):
         found, _ = series(material, shortest, longest, tolerance, until_end=True)
-        return found if math.isfinite(material.final_compliance) else replace(found, fluidity=found.fluidity or _FLOWS)
+        return found if material.is_solid else replace(found, fluidity=found.fluidity or _FLOWS)
     material.creep_compliance(longest)  # refuses a table that ends earlier
     return replace(material, longest=math.inf)

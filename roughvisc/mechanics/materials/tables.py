@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 import scipy  # which imports a submodule when it is first used: scipy.optimize takes 0.2 s
@@ -15,12 +17,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.material import Prony
+from roughvisc.mechanics.materials.material import Prony, ThermalLaw
 from roughvisc.mechanics.materials.models import Kind, relaxation_series, tensile_to_shear
 from roughvisc.mechanics.materials.series import lattice, nonnegative
+from roughvisc.mechanics.materials.superposition import Vertical, groups_of, superpose
 from roughvisc.units import Quantity, format_quantity, listed, number, quantities
 
 Array = NDArray[np.float64]
+#: Columns of a table.
+Columns = tuple[Array, ...]
 
 #: Numbers of terms per decade to try in turn.
 _OFFERED = (1, 1.5, 2, 3, 4, 6, 12, 24)
@@ -36,35 +41,60 @@ _SLOWER = 3.0
 #: given instantaneous compliance, and the terms are chosen later, for a program.
 _MODULI, _CREEP = (3.0, 2e-4), (10.0, 1e-7)
 #: Largest ratio of moduli measured at one frequency and one temperature, and largest relative difference of frequencies
-#: that count as equal.
-_ONE_TEMPERATURE, _SAME_FREQUENCY = 2.0, 1e-6
+#: that count as equal. The ratio refuses all of 14 tables with several temperatures or amplitudes, and none of 56
+#: others, whose largest ratio was 1.02 to 1.06.
+_ONE_TEMPERATURE, _SAME_FREQUENCY = 1.1, 1e-3
+#: Decades before the first time of a relaxation test that are extrapolated, and scale of these rows over their modulus;
+#: largest time of the rows that are continued, over the first one, their smallest number, and the ratio of the first to
+#: the mean slope from which they are the tail of one process.
+_EXTRAPOLATED, _BEFORE = 1.5, 10.0
+_FIRST_ROWS, _FEWEST_ROWS, _STEEPER = 4.0, 4, 2.0
+#: Largest ratio of values at equal, rounded times.
+_EQUAL_TIMES = 2.0
+#: Part of the largest compliance below which a row at most zero is left out, if the noise is less.
+_LEFT_OUT = 0.05
+#: Remedy of a table with several temperatures or steps.
+_TELL = "state their column as temperature, or the step of an export as part"
 #: Largest ratio of the times of neighbouring rows without a warning.
 _DECADE = 10.0 * (1 + 1e-9)
 
 
-@quantities(times="s ...", compliances="1/Pa ...", noise="1 >= 0")
+@quantities(times="s ...", compliances="1/Pa ...", noise="1 >= 0", temperatures="K ...", temperature="K > 0")
 def creep_table(
     times: Sequence[Quantity],
     compliances: Sequence[Quantity],
-    kind: Kind = "shear",
+    kind: Kind,
     noise: float = 0.0,
     poisson: float = 0.5,
+    *,
+    temperatures: Sequence[Quantity] = (),
+    temperature: Quantity | None = None,
+    vertical: Vertical | None = None,
+    note: str = "",
 ) -> Prony:
     """Material from a creep test: ``J(t)`` in shear, or ``D(t)`` in tension with ``J = 2 (1 + nu) D``.
 
     Parameters
     ----------
     times : sequence of float or str
-        Times in increasing order; the first may be zero. [s]
+        Times, which do not decrease; the first may be zero. Rows of equal, rounded times are averaged. [s]
     compliances : sequence of float or str
-        ``J`` or ``D`` at these times. [1/Pa]
+        ``J`` or ``D`` at these times. Rows at most zero are left out as noise. [1/Pa]
     kind : {"shear", "tensile"}
-        Kind of the compliance.
+        Kind of the compliance; without a default, since a wrong one changes the material by ``2 (1 + nu)``.
     noise : float
-        Largest relative decrease below an earlier row that counts as noise, such as 0.01. Smaller deviations
-        of the fit from the rows cause no warning.
+        Largest decrease below an earlier row that counts as noise, relative to the largest compliance, such as 0.01.
+        Smaller deviations of the fit from the rows cause no warning.
     poisson : float
         Poisson ratio, constant in time.
+    temperatures : sequence of float or str
+        Temperature of each row, if there are several. The times begin again at each. [K]
+    temperature : float or str
+        Temperature of the contact, within those of the rows; without a default if there are several. [K]
+    vertical : {"none", "rubber"}
+        Whether moduli are proportional to the absolute temperature too; without a default if there are several.
+    note : str
+        Origin of the rows, for the note of the material.
 
     Returns
     -------
@@ -75,7 +105,7 @@ def creep_table(
     Raises
     ------
     InputError
-        If a row is negative, not finite, not in increasing order of time, zero after time zero, or lower than an
+        If a row is not finite, not in order of time, negative by more than noise, or lower than an
         earlier one by more than the noise; the message names the row, counted from 0. Programs longer than the table
         are refused later.
 
@@ -83,49 +113,43 @@ def creep_table(
     -----
     A compliance at time zero is the instantaneous compliance. Before a first row at a later time, the first decade of
     rows is extrapolated to time zero as a power of time or by a decade of logarithmic creep, whichever falls less, and
-    to a tenth of the first row at least.
+    to a tenth of the first row at least. For several temperatures see :func:`dynamic_table`.
     """
-    factor = tensile_to_shear(kind, poisson)
-    t, values = _checked_rows(("time", "compliance"), times, np.asarray(compliances, dtype=float) * factor)
-    for row in np.flatnonzero((values == 0) & (t > 0))[:1]:
-        raise InputError(f"table row {row}: compliance is 0 at {t[row]:g} s: expected a positive compliance")
-    highest = np.maximum.accumulate(values)
-    for row in np.flatnonzero(values < (1 - noise) * highest)[:1]:
-        below = f"compliance is {1 - values[row] / highest[row]:.2%} below an earlier row"
-        raise InputError(f"table row {row}: {below}, noise is {noise:g}: expected ascending compliances or more noise")
-    # equal weights of relative deviations; a compliance of zero comes first and does not move
-    weights = (highest[-1] / np.where(values > 0, values, highest[-1])) ** 2
-    ascending = np.maximum.accumulate(scipy.optimize.isotonic_regression(values, weights=weights).x)
-    rows, measured = t[t > 0], values[t > 0]
-    glassy = float(ascending[0]) if t[0] == 0 else _instantaneous(rows, ascending)
-
-    def columns(tau: Array) -> Array:
-        return np.column_stack([rows / rows[-1], -np.expm1(-rows[:, None] / tau)])
-
-    weights, tau, misfit, about = _fitted(columns, rows, measured, measured - glassy, measured, _CREEP)
-    note = about["note"] + f", times {t[0]:g} to {t[-1]:g} s"
-    if t[0] > 0:
-        note += f"; nothing was measured before {t[0]:g} s: instantaneous compliance of {glassy:.3g} 1/Pa extrapolated"
-    about |= {"note": note, "longest": float(t[-1]), "misfit": misfit if misfit > noise else 0.0}
-    return Prony(glassy, float(weights[0] / rows[-1]), tuple(weights[1:]), tuple(tau), poisson, **about)
+    columns = _columns(("time", "compliance"), times, compliances)
+    known = _Measured("creep", kind, noise, poisson, vertical, note)
+    return known.at_temperature(columns, temperatures, temperature)
 
 
-@quantities(times="s ...", moduli="Pa ...")
+@quantities(times="s ...", moduli="Pa ...", noise="1 >= 0", temperatures="K ...", temperature="K > 0")
 def relaxation_table(
-    times: Sequence[Quantity], moduli: Sequence[Quantity], kind: Kind = "shear", poisson: float = 0.5
+    times: Sequence[Quantity],
+    moduli: Sequence[Quantity],
+    kind: Kind,
+    noise: float = 0.05,
+    poisson: float = 0.5,
+    *,
+    temperatures: Sequence[Quantity] = (),
+    temperature: Quantity | None = None,
+    vertical: Vertical | None = None,
+    note: str = "",
 ) -> Prony:
     """Material from a relaxation test, by a positive series of exponentials.
 
     Parameters
     ----------
     times : sequence of float or str
-        Times in increasing order; the first may be zero. [s]
+        Times, which do not decrease; the first may be zero. Rows of equal, rounded times are averaged. [s]
     moduli : sequence of float or str
         ``G`` or ``E`` at these times. [Pa]
     kind : {"shear", "tensile"}
-        Kind of the modulus; ``G = E / (2 (1 + nu))``.
+        Kind of the modulus, ``G = E / (2 (1 + nu))``; without a default.
+    noise : float
+        Root mean square of the relative misfit above which the material warns. If rows are at most zero, moduli are
+        known to this part of the largest one.
     poisson : float
         Poisson ratio, constant in time.
+    temperatures, temperature, vertical, note
+        As for :func:`creep_table`.
 
     Returns
     -------
@@ -135,105 +159,370 @@ def relaxation_table(
     Raises
     ------
     InputError
-        If a row is negative, not finite, or not in increasing order of time; the row is named, counted from 0.
+        If a row is not finite, not in order of time, or negative by more than noise; the row is named, counted from 0.
 
     Notes
     -----
     ``G(t) = G_e + sum G_k exp(-t / theta_k)`` by non-negative least squares of the relative misfit on a lattice of
     ``theta``; then :func:`~roughvisc.mechanics.materials.models.relaxation_series`, which is exact. Outside the
-    measured times its slowest and its fastest terms determine the series.
+    measured times its slowest and its fastest terms determine the series. For several temperatures see
+    :func:`dynamic_table`.
     """
-    t, values = _checked_rows(("time", "modulus"), times, moduli)
-    for row in np.flatnonzero(values == 0)[:1]:
-        raise InputError(f"table row {row}: modulus is 0: expected a positive modulus")
-    shear = values / tensile_to_shear(kind, poisson)
-    later = t > 0
-
-    def columns(theta: Array) -> Array:
-        return np.column_stack([np.ones(t.size), np.exp(-t[:, None] / theta)])
-
-    weights, theta, _, about = _fitted(columns, t[later], shear[later], shear, shear, _MODULI)
-    about["note"] += f", times {t[0]:g} to {t[-1]:g} s"
-    return relaxation_series(float(weights[0]), weights[1:], theta, poisson, **about)
+    columns = _columns(("time", "modulus"), times, moduli)
+    known = _Measured("relaxation", kind, noise, poisson, vertical, note)
+    return known.at_temperature(columns, temperatures, temperature)
 
 
-@quantities(frequencies="1 ...", storage="Pa ...", loss="Pa ...")
+@quantities(
+    frequencies="1 ...", storage="Pa ...", loss="Pa ...", noise="1 >= 0", temperatures="K ...", temperature="K > 0"
+)
 def dynamic_table(
     frequencies: Sequence[float],
     storage: Sequence[Quantity],
     loss: Sequence[Quantity],
     *,
     frequency_unit: Literal["rad/s", "Hz"],
+    kind: Kind,
     shift_factors: float | Sequence[float] = 1.0,
-    kind: Kind = "shear",
+    noise: float = 0.05,
     poisson: float = 0.5,
+    temperatures: Sequence[Quantity] = (),
+    temperature: Quantity | None = None,
+    vertical: Vertical | None = None,
+    note: str = "",
 ) -> Prony:
-    """Material from dynamic moduli, a master curve if shift factors are given, by a positive series.
+    """Material from dynamic moduli at one or several temperatures, or from a master curve, by a positive series.
 
     Parameters
     ----------
     frequencies : sequence of float
-        Frequencies in any order; several temperatures may overlap. [`frequency_unit`]
+        Frequencies in any order. [`frequency_unit`]
     storage, loss : sequence of float or str
         ``G'`` and ``G''``, or ``E'`` and ``E''``. [Pa]
     frequency_unit : {"rad/s", "Hz"}
         Angular frequency, or cycles per second. It has no default, because the wrong unit changes all times by the
         factor 2 pi.
+    kind : {"shear", "tensile"}
+        Which moduli, ``G = E / (2 (1 + nu))``; without a default.
     shift_factors : float or sequence of float
         ``a_T`` of each row, or one for all: the factor for its frequency.
-    kind : {"shear", "tensile"}
-        Which moduli; ``G = E / (2 (1 + nu))``.
+    noise : float
+        Root mean square of the relative misfit above which the material warns. If rows are negative, moduli are known
+        to this part of ``|G*|``.
     poisson : float
         Poisson ratio, constant in time.
+    temperatures : sequence of float or str
+        Temperature of each row, instead of shift factors. Rows within 1.5 K of each other count as one temperature. [K]
+    temperature : float or str
+        Temperature of the contact, within those of the rows; without a default if there are several. [K]
+    vertical : {"none", "rubber"}
+        Whether moduli are proportional to the absolute temperature too; without a default if there are several.
+        ``"rubber"`` suits melts and rubbers, ``"none"`` polymers near the glass transition.
+    note : str
+        Origin of the rows, for the note of the material.
 
     Returns
     -------
     Prony
-        Its ``note`` states the number of terms, the misfit at the rows, and the measured frequencies.
+        Its ``note`` states the number of terms, the misfit at the rows, the measured frequencies, and the shifts.
 
     Raises
     ------
     InputError
-        If a number is negative or not finite, or a frequency or a shift factor is not positive; the row is named.
+        If a number is not finite or negative by more than noise, or a frequency or a shift factor is not positive; if
+        rows of one frequency have moduli that differ by more than 10 % or twice the noise; if all rows have one
+        frequency; or if the temperature is not within those of the rows. The row is named.
 
     Notes
     -----
     ``G' = G_e + sum G_k w^2 theta_k^2 / (1 + w^2 theta_k^2)`` and ``G'' = sum G_k w theta_k / (1 + w^2 theta_k^2)``
     are fitted together by non-negative least squares, each relative to itself, or to a thousandth of ``|G*|`` where
     it is smaller. A large misfit means that the two moduli do not belong to one passive material.
+
+    The shift factors of several temperatures are those with which the storage moduli agree best with one positive
+    series (:func:`~roughvisc.mechanics.materials.superposition.superpose`). Between the measured temperatures
+    ``log a_T`` is interpolated over ``1/T``. ``material.at(temperature)`` is the material at another temperature.
     """
     one_of("frequency_unit", frequency_unit, ("rad/s", "Hz"))
     if isinstance(shift_factors, Sequence | np.ndarray):
         factors = listed(shift_factors, "1", "shift_factors")
     else:
         factors = np.full(len(frequencies), number(shift_factors, "1", "shift_factors"))
+    is_master = len(set(factors.tolist())) > 1
+    if is_master and len(temperatures):
+        raise InputError(key="shift_factors", found=shift_factors, expected="either shift_factors or temperatures")
     names = ("frequency", "storage modulus", "loss modulus", "shift factor")
-    omega, elastic, viscous, factors = _checked_rows(names, frequencies, storage, loss, factors, ascending=False)
+    omega, elastic, viscous, factors = _columns(names, frequencies, storage, loss, factors)
     omega = omega * factors * (2 * math.pi if frequency_unit == "Hz" else 1.0)
-    for row in np.flatnonzero((omega == 0) | (elastic + viscous == 0))[:1]:
-        raise InputError(f"table row {row}: a frequency, a shift factor or both moduli are 0: expected positive")
-    elastic, viscous = (one / tensile_to_shear(kind, poisson) for one in (elastic, viscous))
-    size, at = np.hypot(elastic, viscous), 1 / omega
-    order = np.argsort(at, kind="stable")
-    again = np.diff(np.log(at[order])) < _SAME_FREQUENCY
-    apart = np.abs(np.diff(np.log(size[order]))) > np.log(_ONE_TEMPERATURE)
-    for row in order[1:][again & apart][:1]:
-        same = f"other moduli than a row with the same frequency, {omega[row]:g} rad/s"
-        raise InputError(f"table row {row}: {same}: several temperatures? expected the rows of one, or shift_factors")
-    least = 1e-3 * size
-    target, scale = np.append(elastic, viscous), np.append(np.maximum(elastic, least), np.maximum(viscous, least))
-
-    def columns(theta: Array) -> Array:
-        x = omega[:, None] * theta
-        in_phase = np.column_stack([np.ones(omega.size), x**2 / (1 + x**2)])
-        return np.vstack([in_phase, np.column_stack([np.zeros(omega.size), x / (1 + x**2)])])
-
-    weights, theta, _, about = _fitted(columns, at[order], size[order], target, scale, _MODULI)
-    about["note"] += f", frequencies {omega.min():g} to {omega.max():g} rad/s"
-    return relaxation_series(float(weights[0]), weights[1:], theta, poisson, **about)
+    known = _Measured("dynamic", kind, noise, poisson, vertical, note, is_master=is_master)
+    return known.at_temperature((omega, elastic, viscous), temperatures, temperature)
 
 
-def _checked_rows(names: tuple[str, ...], *columns: ArrayLike, ascending: bool = True) -> tuple[Array, ...]:
+class _Checked(NamedTuple):
+    """Columns of one temperature without rows that are noise; a note of these rows, and their number."""
+
+    columns: Columns
+    note: str = ""
+    left_out: int = 0
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """Statements about the rows of a table, and the series fitted to rows."""
+
+    quantity: Literal["creep", "relaxation", "dynamic"]
+    kind: Kind
+    noise: float
+    poisson: float
+    vertical: Vertical | None
+    note: str
+    is_master: bool = False
+
+    def at_temperature(self, columns: Columns, temperatures: Sequence[float], temperature: float | None) -> Prony:
+        """Return the material at a temperature: that of the rows, or one of several."""
+        if not len(temperatures):
+            for key, value in (("temperature", temperature), ("vertical", self.vertical)):
+                if value is not None:
+                    raise InputError(key=key, found=value, expected="temperatures, one for each row")
+            return self.series(self.checked(columns))
+        names = ("frequency or time", *["value"] * (len(columns) - 1), "temperature")
+        *_, measured = _columns(names, *columns, temperatures)
+        _, group = groups_of(measured)
+        lowest, highest = float(measured.min()), float(measured.max())
+        within = f"{lowest - 273.15:.4g} to {highest - 273.15:.4g} degC"
+        if group.max() == 0:
+            if temperature is not None and not lowest <= temperature <= highest:
+                raise InputError(key="temperature", found=temperature, expected=f"the measured temperature, {within}")
+            return replace(self, note=joined(self.note, f"measured at {within}")).series(self.checked(columns))
+        if temperature is None:
+            expected = f"the temperature of the contact, within the measured ones, {within}"
+            raise InputError(key="temperature", found=None, expected=expected)
+        law = _superposed(self, *(tuple(column.tolist()) for column in (*columns, measured)))
+        found = law.at(temperature)
+        assert isinstance(found, Prony)
+        return found
+
+    def checked(self, columns: Columns, rows: NDArray[np.intp] | None = None) -> _Checked:
+        """Return the columns of one temperature without rows that are noise.
+
+        Parameters
+        ----------
+        columns : tuple of ndarray
+            Frequency or time, and values.
+        rows : ndarray of int, optional
+            Number of each row in the table, for messages.
+        """
+        rows = np.arange(columns[0].size) if rows is None else rows
+        if self.quantity == "dynamic":
+            return _Checked(self._checked_moduli(columns, rows))
+        t, values = columns
+        name = "compliance" if self.quantity == "creep" else "modulus"
+        largest = float(values.max())
+        noise = max(self.noise, _LEFT_OUT) if self.quantity == "creep" else self.noise
+        for place in np.flatnonzero(~(values >= -noise * largest))[:1]:
+            expected = f"at least zero, less {noise:g} of the largest, which is noise"
+            raise InputError(f"table row {rows[place]}: {name} is {values[place]:g}: expected {expected}")
+        for place in np.flatnonzero(np.diff(t) < 0)[:1] + 1:
+            again = f"time {t[place]:g} after {t[place - 1]:g}: expected ascending time"
+            raise InputError(f"table row {rows[place]}: {again}; several temperatures? {_TELL}")
+        notes = []
+        left_out = 0
+        if self.quantity == "creep":
+            kept = (values > 0) | ((t == 0) & (values == 0))
+            left_out = int(np.count_nonzero(~kept))
+            if left_out:
+                notes.append(f"{left_out} rows at most zero left out")
+            t, values, rows = t[kept], values[kept], rows[kept]
+        elif values[t == 0].size and values[t == 0].min() <= 0:
+            raise InputError(f"table row {rows[0]}: modulus is {values[0]:g} at time zero: expected a positive modulus")
+        first = np.flatnonzero(np.diff(t, prepend=-1.0) > 0)
+        if equal := t.size - first.size:
+            counts = np.diff(first, append=t.size)
+            ratio = np.maximum.reduceat(values, first) / np.maximum(np.minimum.reduceat(values, first), noise * largest)
+            for place in first[np.flatnonzero((ratio > _EQUAL_TIMES) & (t[first] > 0))][:1]:
+                again = f"other {name} than a row with the same time, {t[place]:g} s"
+                raise InputError(f"table row {rows[place]}: {again}: several temperatures? expected one; {_TELL}")
+            t, values, rows = t[first], np.add.reduceat(values, first) / counts, rows[first]
+            notes.append(f"{equal + np.count_nonzero(counts > 1)} rows of equal times averaged")
+        if t.size < 2:
+            raise InputError(f"table has {t.size} rows with a time of their own: expected at least two")
+        if self.quantity == "creep":
+            highest = np.maximum.accumulate(values)
+            for place in np.flatnonzero(highest - values > self.noise * highest[-1])[:1]:
+                below = f"compliance is {1 - values[place] / highest[place]:.2%} below an earlier row"
+                expected = "ascending compliances or more noise"
+                found = f"{below}, noise is {self.noise:g} of the largest"
+                raise InputError(f"table row {rows[place]}: {found}: expected {expected}")
+        return _Checked((t, values), "; ".join(notes), left_out)
+
+    def _checked_moduli(self, columns: Columns, rows: NDArray[np.intp]) -> Columns:
+        """Return frequency, storage and loss of one temperature; refuse rows of several."""
+        omega, elastic, viscous = columns
+        size = np.hypot(elastic, viscous)
+        for name, value in (("storage modulus", elastic), ("loss modulus", viscous)):
+            for place in np.flatnonzero(~(value >= -self.noise * size))[:1]:
+                expected = f"at least zero, less {self.noise:g} of |G*|, which is noise"
+                raise InputError(f"table row {rows[place]}: {name} is {value[place]:g}: expected {expected}")
+        for place in np.flatnonzero((omega <= 0) | (size == 0))[:1]:
+            zero = "a frequency, a shift factor or both moduli are 0"
+            raise InputError(f"table row {rows[place]}: {zero}: expected positive")
+        order = np.argsort(omega, kind="stable")
+        first = np.flatnonzero(np.diff(np.log(omega[order]), prepend=-np.inf) > _SAME_FREQUENCY)
+        if first.size < 2:
+            found = f"table has one frequency, {omega[0]:g} rad/s: expected several frequencies"
+            raise InputError(f"{found}; an amplitude sweep or a temperature ramp? {_TELL}")
+        if self.is_master:
+            return columns
+        ratio = np.maximum.reduceat(size[order], first) / np.minimum.reduceat(size[order], first)
+        for place in np.flatnonzero(ratio > max(_ONE_TEMPERATURE, 1 + 2 * self.noise))[:1]:
+            same = order[first[place] : np.append(first, omega.size)[place + 1]]
+            row = int(same[np.abs(np.log(size[same] / size[same[0]])).argmax()])
+            again = f"|G*| differs by a factor {ratio[place]:.3g} among rows of one frequency, {omega[row]:g} rad/s"
+            raise InputError(f"table row {rows[row]}: {again}: several temperatures? expected one; {_TELL}")
+        return columns
+
+    def series(self, checked: _Checked) -> Prony:
+        """Return the series fitted to rows of one temperature."""
+        factor = tensile_to_shear(self.kind, self.poisson)
+        about, columns = joined(self.note, checked.note), checked.columns
+        if self.quantity == "creep":
+            return self._creep(columns[0], columns[1] * factor, about, checked.left_out > 0)
+        if self.quantity == "relaxation":
+            return self._relaxation(columns[0], columns[1] / factor, about)
+        return self._dynamic(columns[0], columns[1] / factor, columns[2] / factor, about)
+
+    def _creep(self, t: Array, values: Array, note: str, is_late: bool) -> Prony:
+        # equal weights of relative deviations; a compliance of zero comes first and does not move
+        highest = float(values.max())
+        weights = (highest / np.where(values > 0, values, highest)) ** 2
+        ascending = np.maximum.accumulate(scipy.optimize.isotonic_regression(values, weights=weights).x)
+        rows, measured = t[t > 0], values[t > 0]
+        before, softer, glassy = np.zeros(0), np.zeros(0), float(ascending[0])
+        if t[0] > 0:
+            glassy = _instantaneous(rows, ascending)
+        if t[0] > 0 and is_late:
+            before, softer = _earlier_creep(rows, ascending, glassy)
+        times, course = np.append(before, rows), np.append(softer, measured)
+        scale = np.append(_BEFORE * softer, measured)
+
+        def columns(tau: Array) -> Array:
+            return np.column_stack([times / times[-1], -np.expm1(-times[:, None] / tau)])
+
+        weights, tau, fit = _fitted(columns, times, course, course - glassy, scale, _CREEP, before.size)
+        text = f"{fit.note}, times {t[0]:g} to {t[-1]:g} s"
+        if t[0] > 0:
+            missing = f"nothing was measured before {t[0]:g} s"
+            text += f"; {missing}: instantaneous compliance of {glassy:.3g} 1/Pa extrapolated"
+        return Prony(
+            glassy,
+            float(weights[0] / rows[-1]),
+            tuple(weights[1:]),
+            tuple(tau),
+            self.poisson,
+            note=joined(text, note),
+            warning=fit.warning,
+            longest=float(t[-1]),
+            misfit=fit.largest if fit.largest > self.noise else 0.0,
+        )
+
+    def _relaxation(self, t: Array, shear: Array, note: str) -> Prony:
+        # rows at most zero state that all moduli are known to the noise of the largest
+        scale = np.maximum(shear, self.noise * shear.max()) if shear.min() <= 0 else shear
+        before, stiffer = _earlier(t, scale)
+        times, target = np.append(before, t), np.append(stiffer, shear)
+        course = np.append(stiffer, scale)
+        scale = np.append(_BEFORE * stiffer, scale)
+        later = times > 0
+
+        def columns(theta: Array) -> Array:
+            return np.column_stack([np.ones(times.size), np.exp(-times[:, None] / theta)])
+
+        weights, theta, fit = _fitted(columns, times[later], course[later], target, scale, _MODULI, before.size)
+        text = f"{fit.note}, times {t[0]:g} to {t[-1]:g} s"
+        if before.size:
+            text += f"; nothing was measured before {t[0]:g} s: modulus extrapolated to {before[0]:.3g} s"
+        if shear.min() <= 0:
+            text += f"; moduli are known to {self.noise:g} of the largest, since some are at most zero"
+        about = {"note": joined(text, note), "warning": joined(fit.warning, self._misfit(fit), " ")}
+        return relaxation_series(float(weights[0]), weights[1:], theta, self.poisson, **about)
+
+    def _dynamic(self, omega: Array, elastic: Array, viscous: Array, note: str) -> Prony:
+        size, at = np.hypot(elastic, viscous), 1 / omega
+        order = np.argsort(at, kind="stable")
+        is_noisy = min(elastic.min(), viscous.min()) < 0
+        least = (self.noise if is_noisy else 1e-3) * size
+        target, scale = np.append(elastic, viscous), np.append(np.maximum(elastic, least), np.maximum(viscous, least))
+
+        def columns(theta: Array) -> Array:
+            x = omega[:, None] * theta
+            in_phase = np.column_stack([np.ones(omega.size), x**2 / (1 + x**2)])
+            return np.vstack([in_phase, np.column_stack([np.zeros(omega.size), x / (1 + x**2)])])
+
+        weights, theta, fit = _fitted(columns, at[order], size[order], target, scale, _MODULI)
+        text = f"{fit.note}, frequencies {omega.min():g} to {omega.max():g} rad/s"
+        if is_noisy:
+            text += f"; moduli are known to {self.noise:g} of |G*|, since some are negative"
+        about = {"note": joined(text, note), "warning": joined(fit.warning, self._misfit(fit), " ")}
+        return relaxation_series(float(weights[0]), weights[1:], theta, self.poisson, **about)
+
+    def _misfit(self, fit: _Fit) -> str:
+        """Return a warning of a misfit above the noise, else ''."""
+        if fit.rms <= self.noise:
+            return ""
+        table = "dynamic" if self.quantity == "dynamic" else "relaxation"
+        found = f"The rows of the {table} table deviate by {fit.rms:.2g} (rms, {fit.largest:.2g} at most) from every"
+        causes = "a wrong column or unit, several temperatures, or the compliance of the instrument"
+        return f"{found} passive material, more than the noise {self.noise:g}: {causes}?"
+
+
+@lru_cache(maxsize=8)
+def _superposed(known: _Measured, *columns: tuple[float, ...]) -> ThermalLaw:
+    """Return the law of a table with several temperatures; once for all temperatures of a sweep.
+
+    Parameters
+    ----------
+    known : _Measured
+        Statements about the rows.
+    *columns : tuple of float
+        Frequency or time, values, and temperature of each row.
+    """
+    *given, temperatures = (np.array(column) for column in columns)
+    one_of("vertical", known.vertical, get_args(Vertical))
+    factor = tensile_to_shear(known.kind, known.poisson)
+    _, group = groups_of(temperatures)
+    parts = []
+    of_parts = []
+    for number_of_group in range(int(group.max()) + 1):
+        rows = np.flatnonzero(group == number_of_group)
+        part = known.checked(tuple(column[rows] for column in given), rows)
+        parts.append(part)
+        of_parts.append(np.full(part.columns[0].size, temperatures[rows].mean()))
+    at, *values = (np.concatenate(column) for column in zip(*(part.columns for part in parts), strict=True))
+    names: tuple[Any, ...] = ("storage", "loss") if known.quantity == "dynamic" else (known.quantity,)
+    later = at > 0  # a row at time zero has no reduced time
+    values = [value[later] for value in values]
+    is_noisy = known.quantity == "relaxation" and values[0].min() <= 0
+    least = known.noise * float(values[0].max()) if is_noisy else 0.0
+    rows_of = dict(zip(names, values, strict=True))
+    found = superpose(np.concatenate(of_parts)[later], at[later], rows_of, known.vertical, least)
+    found = replace(found, bounds=(float(temperatures.min()), float(temperatures.max())), factor=factor)
+    reduced, rows_at_reference = found.reduced()
+    order = np.argsort(reduced, kind="stable")
+    master = (reduced[order], *(value[order] for value in rows_at_reference.values()))
+    notes = [found.note, *dict.fromkeys(part.note for part in parts)]
+    checked = _Checked(master, "; ".join(filter(None, notes)), sum(part.left_out for part in parts))
+    material = known.series(checked)
+    material = replace(material, warning=joined(material.warning, found.warning, " "))
+    shift, moduli = found.shift_factor, found.modulus_factor if known.vertical == "rubber" else None
+    return ThermalLaw(material, found.reference_temperature, shift, moduli)
+
+
+def joined(first: str, second: str, sign: str = "; ") -> str:
+    """Return two notes as one; an empty one is left out."""
+    return sign.join(filter(None, (first, second)))
+
+
+def _columns(names: tuple[str, ...], *columns: ArrayLike) -> Columns:
     """Return the columns of a table of measurements as arrays.
 
     Parameters
@@ -242,18 +531,12 @@ def _checked_rows(names: tuple[str, ...], *columns: ArrayLike, ascending: bool =
         Names of the columns, for the messages; the first is the time or the frequency.
     columns : array_like
         Columns of equal length.
-    ascending : bool
-        Whether the first column must ascend.
-
-    Returns
-    -------
-    tuple of ndarray
 
     Raises
     ------
     InputError
-        If the lengths differ, there are fewer than two rows, a number is negative or not finite, or the first
-        column does not ascend; the message names the row, counted from 0.
+        If the lengths differ, there are fewer than two rows, a number is not finite, or the time, the frequency or a
+        shift factor is negative; the message names the row, counted from 0.
     """
     arrays = tuple(np.asarray(column, dtype=float) for column in columns)
     sizes = [array.size for array in arrays]
@@ -261,19 +544,31 @@ def _checked_rows(names: tuple[str, ...], *columns: ArrayLike, ascending: bool =
         found = ", ".join(f"{size} of {name}" for size, name in zip(sizes, names, strict=True))
         raise InputError(f"table has {found}: expected as many, at least two")
     for name, array in zip(names, arrays, strict=True):
-        for row in np.flatnonzero(~(np.isfinite(array) & (array >= 0)))[:1]:
+        is_possible = np.isfinite(array) & ((array >= 0) | (name not in ("time", "frequency", "shift factor")))
+        for row in np.flatnonzero(~is_possible)[:1]:
             raise InputError(f"table row {row}: {name} is {array[row]:g}: expected a finite number, not negative")
-    for row in np.flatnonzero(np.diff(arrays[0]) <= 0)[:1] + 1 if ascending else ():
-        again = f"{names[0]} {arrays[0][row]:g} after {arrays[0][row - 1]:g}"
-        expected = f"expected ascending {names[0]}; several temperatures? expected one, or a master curve"
-        raise InputError(f"table row {row}: {again}: {expected}")
     return arrays
 
 
+class _Fit(NamedTuple):
+    """Misfit of a fitted series: root mean square and largest, relative; a note and a warning."""
+
+    rms: float
+    largest: float
+    note: str
+    warning: str
+
+
 def _fitted(
-    columns: Callable[[Array], Array], at: Array, course: Array, target: Array, scale: Array, most: tuple[float, float]
-) -> tuple[Array, Array, float, dict[str, Any]]:
-    """Return the non-negative weights of a series, its times [s], its largest relative misfit, a note and a warning.
+    columns: Callable[[Array], Array],
+    at: Array,
+    course: Array,
+    target: Array,
+    scale: Array,
+    most: tuple[float, float],
+    unmeasured: int = 0,
+) -> tuple[Array, Array, _Fit]:
+    """Return the non-negative weights of a series, its times [s], and its misfit.
 
     Parameters
     ----------
@@ -285,6 +580,8 @@ def _fitted(
         Target of the sum of the columns, and scale of the misfit of each row.
     most : tuple of float
         See :data:`_MODULI`.
+    unmeasured : int
+        Number of first rows that are extrapolated and do not count in the misfit.
 
     Notes
     -----
@@ -303,13 +600,14 @@ def _fitted(
             rows, wanted = np.vstack([rows, smooth]), np.append(wanted, np.zeros(len(smooth)))
         weights = nonnegative(rows, wanted, np.ones(len(rows)))
         misfit, used = np.abs((terms @ weights - target) / scale), np.append(True, weights[1:] > 0)
+        misfit = misfit[unmeasured:]
         rms = float(np.sqrt(np.mean(misfit**2)))
         fits.append((rms, float(misfit.max()), weights[used], times[used[1:]]))
     enough = max(_FEWER * min(fit[0] for fit in fits), most[1])
     rms, largest, weights, times = min((fit for fit in fits if fit[0] <= enough), key=lambda fit: fit[3].size)
     count, misfits = np.count_nonzero(weights), f"largest misfit {largest:.2g}, rms {rms:.2g} (relative)"
-    note = f"{count} terms fitted to {target.size} values, {misfits}"
-    return weights, times, largest, {"note": note, "warning": _gap(at)}
+    note = f"{count} terms fitted to {target.size - unmeasured} values, {misfits}"
+    return weights, times, _Fit(rms, largest, note, _gap(at))
 
 
 def _gap(times: Array) -> str:
@@ -323,6 +621,47 @@ def _gap(times: Array) -> str:
     before, after = (format_quantity(float(one), "s") for one in times[ratios.argmax() :][:2])
     what = f"The table of the material has no row between {before} and {after}, more than a decade"
     return f"{what}: the material between is a guess that stated errors do not include. Use one row per decade."
+
+
+def _earlier(times: Array, moduli: Array) -> tuple[Array, Array]:
+    """Return times before the first of a relaxation test, ascending [s], and moduli there.
+
+    The modulus goes on as a power of time with the mean slope of the first rows or of the first decade, or flattens
+    towards earlier times as it does in the first rows, whichever rises less. It is not continued if the first rows are
+    the tail of one fast process. A series without these rows ends at a third of the first time: its
+    compliance there is a quarter too large for a polymer in the glass transition.
+    """
+    nothing = np.zeros(0)
+    first = times <= _FIRST_ROWS * times[0]
+    if times[0] == 0 or np.count_nonzero(first) < _FEWEST_ROWS:
+        return nothing, nothing
+    x, y = np.log(times[first] / times[0]), np.log(moduli[first])
+    decade = times <= 10 * times[0]
+    of_decade, _ = np.polyfit(np.log(times[decade]), np.log(moduli[decade]), 1)
+    mean = max(np.polyfit(x, y, 1)[0], of_decade)
+    bend, slope, level = np.polyfit(x, y, 2)
+    if slope < _STEEPER * mean:
+        return nothing, nothing
+    earlier = np.linspace(-_EXTRAPOLATED * np.log(10), 0.0, int(6 * _EXTRAPOLATED) + 1)
+    slopes = np.minimum(np.maximum(mean, slope + 2 * min(bend, 0.0) * earlier), 0.0)
+    steps = np.diff(earlier) * (slopes[1:] + slopes[:-1]) / 2
+    rise = -np.cumsum(steps[::-1])[::-1]
+    return times[0] * np.exp(earlier[:-1]), np.exp(level + rise)
+
+
+def _earlier_creep(times: Array, compliances: Array, glassy: float) -> tuple[Array, Array]:
+    """Return times before the first of a creep test, ascending [s], and compliances there, [1/Pa].
+
+    The compliance is a power of time above the instantaneous one, with the slope of the first rows. They replace first
+    rows that are lost in noise.
+    """
+    first = times <= _FIRST_ROWS * times[0]
+    if np.count_nonzero(first) < _FEWEST_ROWS or not compliances[0] > glassy:
+        return np.zeros(0), np.zeros(0)
+    slope, _ = np.polyfit(np.log(times[first]), np.log(compliances[first]), 1)
+    exponent = min(slope * compliances[0] / (compliances[0] - glassy), 1.0)
+    ratios = 10 ** np.linspace(-_EXTRAPOLATED, 0.0, int(6 * _EXTRAPOLATED) + 1)[:-1]
+    return times[0] * ratios, glassy + (compliances[0] - glassy) * ratios**exponent
 
 
 def _instantaneous(times: Array, compliances: Array) -> float:

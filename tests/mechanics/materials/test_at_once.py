@@ -37,7 +37,7 @@ def test_power_law__jumps_by_what_is_there_at_once(material):
 @pytest.mark.parametrize("first", [(), (0.0,)])
 def test_table__jumps_by_what_is_there_at_once(first):
     t = np.append(first, ROWS)
-    table = rv.creep_table(t, creep(t))
+    table = rv.creep_table(t, creep(t), kind="shear")
     times = [0.0, 1e-4, 1.0, 10.0]
     found, ds = sunk(table, rv.Program().load(2.0, over=0).hold(10.0), times, tolerance=1e-2)
     assert 0 < ds.attrs["series_error"] <= 1e-3

@@ -130,6 +130,21 @@ def test_ratios__are_those_of_finite_element_codes():
     assert moduli[np.argsort(times)] == pytest.approx([2e6, 0.8e6], rel=1e-10)
 
 
+def test_ratios__of_a_long_term_modulus_and_of_a_relaxing_bulk_modulus():
+    """Cards of Abaqus and Ansys: both state the same material, by instantaneous and by long-term moduli."""
+    shear, times = np.array([0.3, 0.25, 0.15]), np.array([0.02, 0.7, 15.0])
+    bulk, bulk_times = np.array([0.2, 0.1]), np.array([0.02, 3.0])
+    terms = {"ratios": shear, "times": times, "bulk_ratios": bulk, "bulk_times": bulk_times}
+    at_once = rv.from_relaxation(instantaneous=2e6, bulk_modulus=5e6, **terms)
+    in_the_end = rv.from_relaxation(equilibrium=0.3 * 2e6, bulk_modulus=0.7 * 5e6, **terms)
+    s = LAPLACE[:, None]
+    modulus = 2e6 * (0.3 + (shear * s * times / (1 + s * times)).sum(1))
+    volume = 5e6 * (0.7 + (bulk * s * bulk_times / (1 + s * bulk_times)).sum(1))
+    exact = 0.25 * (1 / modulus + 3 / (3 * volume + modulus))
+    for material in (at_once, in_the_end):
+        assert 0.25 * transformed(material, LAPLACE) == pytest.approx(exact, rel=1e-12)
+
+
 def test_ratios__of_one_in_sum_make_a_fluid():
     """Thirds with ten printed digits are no solid of a ten-billionth of the modulus."""
     thirds = rv.from_relaxation(instantaneous=1e6, ratios=[0.3333333333] * 3, times=[1e-3, 1.0, 1e3])
@@ -146,6 +161,9 @@ def test_ratios__of_one_in_sum_make_a_fluid():
         ({"instantaneous": 1e6, "moduli": [2.0], "times": [1]}, "ratios", 0),
         ({"equilibrium": 1e6, "instantaneous": 2e6}, "instantaneous", 2e6),
         ({"moduli": [2.0], "times": [1]}, "equilibrium", None),
+        ({"equilibrium": 1e6, "ratios": [0.5, 0.5], "times": [1, 2]}, "ratios", [0.5, 0.5]),
+        ({"equilibrium": 1e6, "bulk_ratios": [0.5], "bulk_times": [1]}, "bulk_ratios", [0.5]),
+        ({"equilibrium": 1e6, "bulk_modulus": 1e6, "bulk_ratios": [0.5], "bulk_times": [0]}, "bulk_times[0]", 0),
         ({"instantaneous": 0.0, "ratios": [0.1], "times": [1]}, "instantaneous", 0.0),
         ({"equilibrium": 1.0, "poisson": 0.5, "bulk_modulus": 3.0}, "bulk_modulus", 3.0),
         ({"equilibrium": 1.0, "bulk_modulus": 0.0}, "bulk_modulus", 0.0),

@@ -83,7 +83,7 @@ def test_series__of_a_series_is_itself():
 
 def table(**keys):
     t = np.geomspace(1e-3, 1e3, 60)
-    return rv.creep_table(t, CURVES["logarithm"](t), **keys)
+    return rv.creep_table(t, CURVES["logarithm"](t), **keys, kind="shear")
 
 
 def test_series__of_a_table_has_fewer_terms_for_less():

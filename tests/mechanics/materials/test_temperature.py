@@ -43,8 +43,24 @@ def test_scaled__is_the_material_in_reduced_time_or_stiffer(material, factor):
     assert rv.shift(moved, 1 / factor).contact_compliance(t) == pytest.approx(compliance)
 
 
+@pytest.mark.parametrize("law", [{"wlf_c1": 8.0, "wlf_c2": "90 K"}, {"activation_energy": "80 kJ/mol"}])
+def test_material_at_a_temperature__is_the_shifted_material(law):
+    """From any temperature on, alone or in a pair with an elastic body, and stiffened."""
+    rubber, steel = rv.zener(3e6, 1e6, 1e5), rv.elastic(80e9, 0.3)
+    factor = (rv.wlf if "wlf_c1" in law else rv.arrhenius)(313.15, 293.15, **law)
+    changing = rv.thermal(rubber, "20 degC", **law)
+    assert changing == rubber == changing.at("20 degC")
+    assert changing.at("40 degC") == changing.at(250.0).at("40 degC") == rv.shift(rubber, factor)
+    assert stiffened(changing, 2.0).at("40 degC") == stiffened(rv.shift(rubber, factor), 2.0)
+    assert rv.pair(steel, changing).at("40 degC") == rv.pair(steel, rv.shift(rubber, factor))
+    creep = rv.creep(rubber.creep_compliance)
+    assert rv.pair(rv.thermal(creep, 293.15, **law), steel).at(313.15).contact_compliance(1e-3) == pytest.approx(
+        rv.pair(rv.shift(rubber, factor), steel).contact_compliance(1e-3)
+    )
+
+
 def test_shifted__a_table_ends_later_in_the_cold():
-    cold = rv.shift(rv.creep_table((0.0, 1.0, 700.0), (1e-7, 2e-7, 8e-7)), 10.0)
+    cold = rv.shift(rv.creep_table((0.0, 1.0, 700.0), (1e-7, 2e-7, 8e-7), kind="shear"), 10.0)
     assert cold.contact_compliance(7000.0) == pytest.approx(8e-7 / 4)
     with pytest.raises(rv.InputError, match="table ends at 7000 s"):
         cold.contact_compliance(7001.0)
@@ -57,6 +73,12 @@ def test_shifted__a_table_ends_later_in_the_cold():
         (lambda: rv.wlf(300.0, 300.0, -1.0, 51.6), "wlf_c1"),
         (lambda: rv.arrhenius(-3.0, 300.0, 1e4), "temperature"),
         (lambda: rv.shift(ELASTIC, 0.0), "factor"),
+        (lambda: ELASTIC.at(300.0), "material"),
+        (lambda: rv.pair(rv.thermal(ELASTIC, 300.0, activation_energy=1e4), rv.maxwell(1, 1)).at(310.0), "material"),
+        (lambda: rv.thermal(ELASTIC, 300.0, wlf_c1=3.0), "wlf_c2"),
+        (lambda: rv.thermal(ELASTIC, 300.0, wlf_c1=3.0, activation_energy=1e4), "wlf_c1"),
+        (lambda: rv.thermal(ELASTIC, 300.0, wlf_c1=3.0, wlf_c2=40.0).at("-20 degC"), "temperature"),
+        (lambda: rv.thermal(ELASTIC, 300.0, activation_energy=9e5).at("1 K"), "temperature"),
         (lambda: rv.shift(ELASTIC, np.nan), "factor"),
         (lambda: rv.shift(ELASTIC, "2 K"), "factor"),
         (lambda: rv.shift(3.0, 2.0), "material"),

@@ -8,6 +8,7 @@ import roughvisc as rv
 from roughvisc.mechanics.materials import MODELS
 from roughvisc.study.case import Case, vary
 
+MODULI = {"frequency_unit": "Hz", "frequencies": [1, 10], "kind": "shear"}
 HEADING = "time [s], compliance [1/Pa]\n"
 #: Coating on rubber.
 COAT = {"model": "elastic", "shear_modulus": "1 GPa", "poisson": 0.35, "thickness": "20 um"}
@@ -29,9 +30,13 @@ ARRHENIUS = {"temperature": 303.15, "reference_temperature": "20 °C", "activati
         ("prony", {"glassy": "1 GPa^-1", "compliances": [1e-6], "times": [1]}),
         ("prony", {"glassy": 1e-9}),
         ("power_law", {"glassy": 0, "coefficient": "1 MPa^-1", "exponent": 0.4, "time_scale": "2 h"}),
+        (
+            "fractional_zener",
+            {"instantaneous": "1 GPa", "equilibrium": "1 MPa", "relaxation_time": "1 ms", "exponent": 0.5},
+        ),
         ("creep_table", {"times": [0, "2 min"], "compliances": [1, 2], "noise": 0.01, "kind": "tensile"}),
-        ("relaxation_table", {"times": [0, 1, 2], "moduli": ["3 MPa", 2e6, 1.5e6], "poisson": 0.3}),
-        ("dynamic_table", {"frequency_unit": "Hz", "frequencies": [1, 10], "storage": [2, 3], "loss": [1, "1 Pa"]}),
+        ("relaxation_table", {"times": [0, 1], "moduli": ["3 MPa", 2e6], "poisson": 0.3, "kind": "shear"}),
+        ("dynamic_table", MODULI | {"storage": [2, 3], "loss": [1, "1 Pa"]}),
     ],
 )
 def test_model__is_that_of_its_function(read_one, model, stated):
@@ -47,11 +52,11 @@ def test_model__is_that_of_its_function(read_one, model, stated):
 )
 def test_creep__from_a_file_is_that_from_lists(read_one, tmp_path, rows):
     (tmp_path / "creep.csv").write_text(rows)
-    case = read_one(material={"model": "creep_table", "file": "creep.csv"})
+    case = read_one(material={"model": "creep_table", "file": "creep.csv", "kind": "shear"})
     listed = read_one(
-        material={"model": "creep_table", "times": [0, 60, 3600], "compliances": [1e-7, 2e-7, 5e-7]},
+        material={"model": "creep_table", "times": [0, 60, 3600], "compliances": [1e-7, 2e-7, 5e-7], "kind": "shear"},
     )
-    assert case.material == listed.material == rv.creep_table((0.0, 60.0, 3600.0), (1e-7, 2e-7, 5e-7))
+    assert case.material == listed.material == rv.creep_table((0.0, 60.0, 3600.0), (1e-7, 2e-7, 5e-7), kind="shear")
     assert case.key == listed.key, "the content counts, not the path or the units"
     (tmp_path / "creep.csv").unlink()
     again = Case.from_json(case.to_json())
@@ -69,21 +74,24 @@ def test_creep__from_a_file_is_that_from_lists(read_one, tmp_path, rows):
 )
 def test_dynamic_table__from_a_file(read_one, tmp_path, rows):
     (tmp_path / "dma.csv").write_text(rows)
-    table = {"model": "dynamic_table", "file": "dma.csv"}
+    table = {"model": "dynamic_table", "file": "dma.csv", "kind": "shear"}
     material = read_one(material=table | {"frequency_unit": "Hz"}).material
-    assert material == rv.dynamic_table((1, 10), (3e6, 5e6), (1e6, 2e6), frequency_unit="Hz")
+    assert material == rv.dynamic_table((1, 10), (3e6, 5e6), (1e6, 2e6), frequency_unit="Hz", kind="shear")
     if "[Hz]" not in rows:
         assert read_one(material=table | {"frequency_unit": "rad/s"}).material != material
 
 
 def test_pair__is_varied_within(read_one, tmp_path):
     (tmp_path / "creep.csv").write_text(f"{HEADING}0, 1\n1, 2")
-    bodies = {"a": {"model": "elastic", "shear_modulus": 1}, "b": {"model": "creep_table", "file": "creep.csv"}}
+    bodies = {
+        "a": {"model": "elastic", "shear_modulus": 1},
+        "b": {"model": "creep_table", "file": "creep.csv", "kind": "shear"},
+    }
     case = read_one(material={"model": "pair", **bodies})
     assert Case.from_json(case.to_json()).key == case.key
     changed = vary(case, {"material.a.shear_modulus": "2 Pa"})
     assert changed.key != case.key
-    assert changed.material == rv.pair(rv.elastic(2.0), rv.creep_table((0, 1), (1, 2)))
+    assert changed.material == rv.pair(rv.elastic(2.0), rv.creep_table((0, 1), (1, 2), kind="shear"))
 
 
 def test_on__makes_a_layer_and_nests(read_one):
@@ -102,6 +110,7 @@ def test_temperature__wlf_arrhenius_and_their_factor_state_the_same(read_one):
     # 10 K above the reference: log10 a = -8 * 10 / 100; the series is that of a Zener solid of 0.1 s
     case, warm = read_one(), read_one(material=ZENER | WLF)
     assert warm.material.times == pytest.approx((0.1 * 10**-0.8,))
+    assert warm.material.at("20 °C") == case.material
     assert read_one(material=ZENER | {"shift_factor": 10**-0.8}).material.times == pytest.approx(warm.material.times)
     assert warm.key != case.key
     arrhenius = read_one(material=ZENER | ARRHENIUS).material
@@ -126,8 +135,15 @@ def test_temperature__both_bodies_of_a_pair_or_one(read_one):
         ({"model": "creep_table", "file": "gone.csv"}, "material.file"),
         ({"model": "creep_table", "file": "creep.csv", "times": [0, 1]}, "material.file"),
         ({"model": "creep_table", "file": "bare.csv"}, "material.file"),
-        ({"model": "creep_table", "file": "falling.csv", "noise": "1 %"}, "material"),
-        ({"model": "dynamic_table", "file": "creep.csv"}, "material.frequency_unit"),
+        ({"model": "creep_table", "times": [0, 1], "compliances": [1, 2]}, "material.kind"),
+        ({"model": "creep_table", "file": "falling.csv", "noise": "1 %", "kind": "shear"}, "material"),
+        ({"model": "dynamic_table", "file": "creep.csv", "kind": "shear"}, "material.file"),
+        ({"model": "dynamic_table", "file": "creep.csv", "frequency_unit": "1/s"}, "material.frequency_unit"),
+        ({"model": "creep_table", "columns": {"time": "t"}, "times": [0, 1], "kind": "shear"}, "material.columns"),
+        (
+            {"model": "creep_table", "times": [0, 1], "compliances": [1, 2], "kind": "shear", "vertical": "none"},
+            "material.vertical",
+        ),
         ({"model": "pair", "a": STIFF | {"shear_modulus": -1}, "b": {"model": "pair"}}, "material.a.shear_modulus"),
         (COAT | {"on": ZENER, "thickness": None}, "material.thickness"),
         (COAT | {"on": ZENER, "base": "bonded"}, "material.base"),

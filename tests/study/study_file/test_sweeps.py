@@ -61,7 +61,7 @@ def test_pattern__stands_for_the_files_that_match_it(read, tmp_path):
 
     def files(stated, **more):
         sweep = {"material.file": stated, **more}
-        creep = {"model": "creep_table", "file": "creep/a.csv"}
+        creep = {"model": "creep_table", "file": "creep/a.csv", "kind": "shear"}
         return [case.varied["material.file"] for case in read(material=creep, sweep=[sweep] if more else sweep)]
 
     every = ["creep/a.csv", "creep/b.csv", "creep/d[1].csv"]

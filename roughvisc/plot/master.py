@@ -1,0 +1,85 @@
+"""Figure of a table with several temperatures: its master curve and its shift factors."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from roughvisc.errors import InputError
+from roughvisc.mechanics.materials.material import Creep, Prony, ThermalLaw
+from roughvisc.mechanics.materials.superposition import Superposition
+from roughvisc.plot import style
+
+#: Measured quantity -> label and marker.
+_QUANTITIES = {
+    "storage": ("Storage modulus", "o"),
+    "loss": ("Loss modulus", "^"),
+    "relaxation": ("Relaxation modulus", "o"),
+    "creep": ("Creep compliance", "o"),
+}
+#: Number of points of the line of the material, and colours of the temperatures, cold to warm.
+_POINTS, _COLOURS = 200, "plasma"
+
+
+@style.apply
+def master_curve(material: Prony | Creep) -> Figure:
+    """Draw the master curve of a table with several temperatures, and its shift factors.
+
+    The left panel has the measured rows at the reference temperature, in the kind of the test, and the fitted material
+    as lines (not for relaxation). The right panel has ``log10 a_T`` with bars of two standard deviations and half the
+    difference between storage and loss.
+
+    Parameters
+    ----------
+    material : Prony or Creep
+        Material of a table with several temperatures, such as ``rv.read_study("study.toml").material``.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        If the material is not of such a table.
+    """
+    law = getattr(material, "thermal", None)
+    superposed = getattr(law.shift, "__self__", None) if isinstance(law, ThermalLaw) else None
+    if not isinstance(law, ThermalLaw) or not isinstance(superposed, Superposition):
+        raise InputError(key="material", found=material, expected="a material of a table with several temperatures")
+    figure, (curve, shifts) = style.new_panels(2, 2, (3.2, 2.6), left=0.75, right=style.BAR)
+    celsius = superposed.temperatures - 273.15
+    at, rows = superposed.reduced()
+    is_creep = "creep" in rows
+    values = np.concatenate([row[row > 0] for row in rows.values()])
+    unit = style.middle_unit(values, "1/Pa" if is_creep else "Pa")
+    colours = Normalize(celsius.min(), celsius.max() if celsius.size > 1 else celsius.min() + 1)
+    span = np.geomspace(at.min(), at.max(), _POINTS)
+    for name, row in rows.items():
+        label, marker = _QUANTITIES[name]
+        look = {"c": celsius[superposed.group], "cmap": _COLOURS, "norm": colours, "s": 10, "lw": 0}
+        points = curve.scatter(at, np.where(row > 0, unit(row), np.nan), marker=marker, label=label, zorder=2, **look)
+    fitted = _lines(law.material, span, superposed.factor) if "relaxation" not in rows else {}
+    for name, line in fitted.items():
+        if name in rows:
+            curve.plot(span, unit(line), color="0.2", lw=0.9, zorder=1, label="Fitted material" * (name != "loss"))
+    style.log_axis(curve.xaxis, at)
+    style.log_axis(curve.yaxis, unit(values))
+    over = "frequency [rad/s]" if "storage" in rows else "time [s]"
+    curve.set_xlabel(f"Reduced {over} at {superposed.reference_temperature - 273.15:.4g} °C")
+    curve.set_ylabel(unit.label("Compliance" if is_creep else "Modulus"))
+    bars = np.hypot(2 * np.nan_to_num(superposed.sigma), np.nan_to_num(superposed.split))
+    shifts.errorbar(celsius, superposed.log_shift, bars, fmt="-", color="0.45", lw=0.8, zorder=1)
+    shifts.scatter(celsius, superposed.log_shift, c=celsius, cmap=_COLOURS, norm=colours, s=18, zorder=2)
+    shifts.set(xlabel="Temperature [°C]", ylabel=r"$\log_{10}\, a_T$")
+    style.colour_bar(points, [shifts], "Temperature [°C]")
+    style.legend_above(figure, style.named_in(curve))
+    return figure
+
+
+def _lines(material: Prony | Creep, at: np.ndarray, factor: float) -> dict[str, np.ndarray]:
+    """Return storage and loss modulus [Pa] and creep compliance [1/Pa] of a material, in the kind of the test."""
+    modulus = factor / material.laplace(1j * at)
+    creep = material.creep_compliance(np.minimum(at, getattr(material, "longest", np.inf))) / factor
+    return {"storage": modulus.real, "loss": modulus.imag, "creep": creep}
