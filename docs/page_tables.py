@@ -7,16 +7,16 @@ import re
 import sys
 
 from roughvisc.judge.audit import LIMITS
-from roughvisc.variables import OF_STEPS, STATUS_MEANINGS, STEP, VARIABLES
+from roughvisc.variables import STATUS_MEANINGS, STEP, VARIABLES
 
 
 def variables():
     """Return the table of all variables of results and observables."""
     lines = ["| variable | over | unit | meaning |", "|---|---|---|---|"]
     for name, one in VARIABLES.items():
-        steps = "steps" if name in OF_STEPS else "rows and steps"
+        steps = "steps" if one.is_of_steps else "rows and steps"
         over = [steps if dim == STEP else f"{dim}s" if dim == "row" else dim for dim in one.dims]
-        meaning = one.long_name + (f"; {one.comment}" if one.comment else "")
+        meaning = one.long_name + (f"; {one.remarks}" if one.remarks else "")
         if name == "status":
             meaning += ": " + ", ".join(f"{i} {word}" for i, word in enumerate(STATUS_MEANINGS))
         lines.append(f"| `{name}` | {', '.join(over) or '-'} | {one.units or '-'} | {meaning} |")

@@ -20,7 +20,7 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.variables import ERRORS, GRID_ERROR, ROW, ROWS, VARIABLES, axis_of
+from roughvisc.variables import ROW, ROWS, VARIABLES, axis_of
 
 #: Coordinate of a sweep with the attributes in which the files of its cases differ, as JSON.
 ATTRIBUTES = "attributes"
@@ -68,10 +68,10 @@ def label(dataset: xr.Dataset) -> xr.Dataset:
             if variable.dtype.kind not in "fUO" and variable.dtype != declared[name].dtype:
                 converted[name] = variable.astype(declared[name].dtype)
     labelled = dataset.assign(converted) if converted else dataset.copy()  # once: each assignment merges the whole
-    for name, one in declared.items():
+    for name, declaration in declared.items():
         attributes = labelled.variables[name].attrs
-        attributes.update(one.attributes)
-        if errors := " ".join(filter(dataset.__contains__, ERRORS[str(name)])):
+        attributes.update(declaration.attributes)
+        if errors := " ".join(filter(dataset.__contains__, declaration.errors)):
             attributes["ancillary_variables"] = errors
     return labelled
 
@@ -95,11 +95,12 @@ def grid_error_of(results: Iterable[Mapping[Any, Any]]) -> str:
     >>> grid_error_of([{"grid_error": [0.709, 0.02]}]), grid_error_of([{"force": [1.0]}])
     ('0.71 of the pressure', 'not estimated (grid_error = true in [solve])')
     """
-    found = list(results)
-    for quantity, name in (("pressure", GRID_ERROR["pressure"]), ("friction", GRID_ERROR["friction_force"])):
-        if errors := [np.ravel(one[name]) for one in found if np.size(one.get(name, ()))]:
+    known = list(results)
+    for quantity in ("pressure", "friction_force"):
+        name = VARIABLES[quantity].grid_error
+        if errors := [np.ravel(result[name]) for result in known if np.size(result.get(name, ()))]:
             largest = np.fmax.reduce(np.concatenate(errors))
-            return "not known" if math.isnan(largest) else f"{largest:.2g} of the {quantity}"
+            return "not known" if math.isnan(largest) else f"{largest:.2g} of the {quantity.removesuffix('_force')}"
     return "not estimated (grid_error = true in [solve])"
 
 

@@ -26,7 +26,7 @@ from roughvisc.experiment.problem import Problem
 from roughvisc.labels import CARRIED, TITLE, label
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.topography.grid import nominal_area
-from roughvisc.variables import OF_STEPS, STEP, STEPPED, VARIABLES
+from roughvisc.variables import STEP, STEPPED, VARIABLES
 from roughvisc.version import program_version
 
 log = logging.getLogger("roughvisc")
@@ -164,7 +164,8 @@ def solve(
 
             dataset = with_grid_error(dataset, height, on_coarser).drop_vars(needed)
     if experiment.axis == "time":
-        dataset = dataset.drop_vars(OF_STEPS, errors="ignore")
+        of_steps = [name for name, variable in VARIABLES.items() if variable.is_of_steps]
+        dataset = dataset.drop_vars(of_steps, errors="ignore")
     return label(dataset[sorted(dataset.data_vars, key=list(VARIABLES).index)])  # main results first
 
 

@@ -24,7 +24,7 @@ ADDED = {
             "VARIABLES: dict[str, Variable] = {\n": '    "stiffness": Variable(_SERIES, "N m-1", "secant stiffness"),\n'
         },
         "experiment/loading.py": {
-            '            "force": point.force,\n': '            "stiffness": point.force / point.approach,\n'
+            '            "approach": point.approach,\n': '            "stiffness": point.force / point.approach,\n'
         },
     },
     "conditioning step": {

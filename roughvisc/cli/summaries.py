@@ -17,7 +17,7 @@ from roughvisc.errors import printable
 from roughvisc.labels import cost_of, grid_error_of
 from roughvisc.topography.grid import spacing
 from roughvisc.units import unit_for
-from roughvisc.variables import AXES, ERRORS, IN_TABLE, VARIABLES, axis_of
+from roughvisc.variables import AXES, VARIABLES, axis_of, in_table
 
 if TYPE_CHECKING:
     from roughvisc.runs.run import Outcome
@@ -73,13 +73,13 @@ def result_table(dataset: xr.Dataset) -> Group:
         ("Grid", f"{dataset.sizes['x']} x {dataset.sizes['y']} cells, {dataset.attrs.get('boundary', '?')} boundary"),
         (axis.rows.capitalize(), f"{dataset.sizes[axis.name]}, to {axis.place(float(dataset[axis.name].max()), 3)}"),
     ]
-    for name in IN_TABLE:
+    for name, variable in in_table("value").items():
         if name in row and name != axis.name:
-            text = readable(float(row[name]), VARIABLES[name].units)
-            for error in filter(row.__contains__, ERRORS[name]):
-                kind = "numerical" if error == f"{name}_error" else "grid"
-                text += f"; {kind} error {readable(float(row[error]), VARIABLES[error].units)}"
-            rows.append((f"{VARIABLES[name].label} {where}", text))
+            text = readable(float(row[name]), variable.units)
+            for kind, error in (("numerical", variable.error), ("grid", variable.grid_error)):
+                if error in row:
+                    text += f"; {kind} error {readable(float(row[error]), VARIABLES[error].units)}"
+            rows.append((f"{variable.label} {where}", text))
         if name == "contact_area" and name in row and not axis.telling:
             most = dataset.isel({axis.name: int(np.argmax(dataset[name].values))})
             text, place = readable(float(most[name]), "m^2"), axis.place(float(most[axis.name]), 3)

@@ -93,6 +93,8 @@ class SteadyState:
         Estimated error of the pressure: sum of its absolute values over the load. [-]
     friction_residual : float
         Estimated relative error of the power force. [-]
+    cell_error : float
+        Estimated error of the pressure of a cell, the largest. [Pa]
     """
 
     pressure: Array
@@ -101,6 +103,7 @@ class SteadyState:
     power_force: float
     residual: float
     friction_residual: float
+    cell_error: float
 
 
 class Sliding:
@@ -233,7 +236,7 @@ def steady_state(
     pressure = xp.full(gap.shape, total / gap.size)
     opening = gap + sliding.displacement(pressure)
     if xp.ptp(gap) == 0:  # uniform pressure, without friction
-        return SteadyState(pressure, opening - gap, float(opening.mean()), 0.0, 0.0, 0.0)
+        return SteadyState(pressure, opening - gap, float(opening.mean()), 0.0, 0.0, 0.0, 0.0)
     approach = float(opening.min()) - _START * float(xp.ptp(opening))
     separation = opening - approach
     errors = math.inf, math.inf
@@ -274,7 +277,8 @@ def steady_state(
             if is_accurate:
                 displacement = sliding.displacement(found)
                 approach = float((found * (gap + displacement)).sum()) / total
-                return SteadyState(found, displacement, approach, force, *errors)
+                of_cell = _CAUTION * float(abs(correction).max())
+                return SteadyState(found, displacement, approach, force, *errors, of_cell)
         widening = -separation - diagonal * step
         length = min(_longest(pressure, step), _longest(separation, widening))
         reached = float(((pressure + length * step) * (separation + length * widening)).sum())

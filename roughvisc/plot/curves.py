@@ -20,15 +20,8 @@ from roughvisc.observables.theory import asperity_fraction, persson_fraction
 from roughvisc.plot import style
 from roughvisc.topography.grid import nominal_area, rms_slope
 from roughvisc.units import Unit, quantities, unit_for
-from roughvisc.variables import AXES, GRID_ERROR, VARIABLES, axis_of
+from roughvisc.variables import AXES, VARIABLES, axis_of
 
-#: Quantities that are drawn if the result holds them.
-_QUANTITIES = (
-    *("force", "approach", "contact_area", "mean_gap", "work", "friction_coefficient"),
-    *("leak_rate", "thermal_conductance", "electrical_conductance"),
-)
-#: Quantity -> its relative error by the grid.
-_GRID_ERROR = GRID_ERROR | {"contact_fraction": "grid_error_area", "friction_coefficient": "grid_error_friction"}
 #: Largest number of rows for which dots are drawn.
 _DOTS = 40
 
@@ -65,7 +58,9 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
     dataset = expect_result(dataset)
     axis = axis_of(dataset.variables)
     over = over or axis
-    default = ("friction_coefficient", "contact_area") if over == "sliding_distance" else _QUANTITIES
+    default = [name for name, variable in VARIABLES.items() if variable.is_panel]
+    if over == "sliding_distance":
+        default = ["friction_coefficient", "contact_area"]
     wanted = [name for name in default if name in dataset] if quantities is None else quantities
     names = listed_names(wanted)
     expect_result(dataset, over, *(names or default))
@@ -107,8 +102,8 @@ def _draw_history(ax: Axes, name: str, steps: xr.Dataset | None, kept: xr.Datase
     if values.size <= _DOTS or steps is None:
         label_of_dots = "kept times" if is_finer or steps is None else None
         ax.plot(at, unit(values), "o", color=colour, label=label_of_dots)
-    error = _GRID_ERROR.get(name, "")
-    if name != "force" and error in kept and kept[error].notnull().any():
+    error = VARIABLES[name].grid_error if name in VARIABLES else ""
+    if error in kept and kept[error].notnull().any():
         ends = (unit(values * (1 + sign * kept[error])) for sign in (-1, 1))
         ax.fill_between(at, *ends, color=colour, alpha=0.18, lw=0, label="error of the grid")
     if f"persson_{name}" in kept:
