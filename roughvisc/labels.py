@@ -104,6 +104,30 @@ def grid_error_of(results: Iterable[Mapping[Any, Any]]) -> str:
     return "not estimated (grid_error = true in [solve])"
 
 
+def error_of(rows: xr.Dataset, name: str) -> xr.DataArray | None:
+    """Return the stated error of a quantity at each row, in its unit: of steps and solver, and of the grid.
+
+    None if the rows have neither. An error of the grid is relative to the largest row over time, and to the same row
+    over speed.
+
+    Parameters
+    ----------
+    rows : xarray.Dataset
+        All rows of a result.
+    name : str
+        Variable over the rows.
+    """
+    if name not in VARIABLES:
+        return None
+    parts = []
+    if VARIABLES[name].error in rows:
+        parts.append(rows[VARIABLES[name].error])
+    if VARIABLES[name].grid_error in rows:
+        size = abs(rows[name])
+        parts.append(rows[VARIABLES[name].grid_error] * (size.max() if axis_of(rows.variables) == "time" else size))
+    return sum(parts[1:], parts[0]) if parts else None
+
+
 def expect_declared_units(dataset: xr.Dataset) -> None:
     """Refuse a result that was converted to other units: derived quantities and figures need SI units.
 

@@ -77,7 +77,7 @@ def result_table(dataset: xr.Dataset) -> Group:
         if name in row and name != axis.name:
             text = readable(float(row[name]), variable.units)
             for kind, error in (("numerical", variable.error), ("grid", variable.grid_error)):
-                if error in row:
+                if error in row and (kind == "grid" or float(row[error]) != 0):  # zero if prescribed
                     text += f"; {kind} error {readable(float(row[error]), VARIABLES[error].units)}"
             rows.append((f"{variable.label} {where}", text))
         if name == "contact_area" and name in row and not axis.telling:
