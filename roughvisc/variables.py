@@ -421,7 +421,7 @@ class Axis:
         """
         return f"{self.symbol} = {unit_for([value], VARIABLES[self.name].units).text(value, digits)}"
 
-    def telling_row(self, histories: Mapping[str, Any]) -> int:
+    def telling_row(self, histories: Mapping[Any, Any]) -> int:
         """Return the number of the row that represents a result in a table."""
         values = np.asarray(histories[self.telling]) if self.telling else np.zeros(0)
         return int(np.nanargmax(values)) if np.isfinite(values).any() else -1
@@ -434,7 +434,7 @@ AXES: dict[str, Axis] = {
 }
 
 
-def axis_of(names: Container[str]) -> str:
+def axis_of(names: Container[Any]) -> str:
     """Return the axis of the rows of a result from the names of its variables.
 
     Examples

@@ -47,7 +47,7 @@ class Failure(click.ClickException):
 
     def __init__(self, message: str, status: int) -> None:
         super().__init__(message)
-        self.exit_code = status
+        vars(self)["exit_code"] = status  # click declares it for the class
 
     def show(self, file: Any = None) -> None:
         complain(self.message)

@@ -184,7 +184,7 @@ def missing_of_zero(error: ArrayLike, size: float) -> Array:
     return error if size > _ZERO else np.where(error > 0, math.nan, error)
 
 
-def at_least(differences: Mapping[str, Array], least: Mapping[str, Array]) -> dict[str, Array]:
+def at_least(differences: Mapping[str, ArrayLike], least: Mapping[str, ArrayLike]) -> dict[str, Array]:
     """Return the error of each quantity due to the grid.
 
     Parameters
@@ -194,7 +194,7 @@ def at_least(differences: Mapping[str, Array], least: Mapping[str, Array]) -> di
     least : mapping
         Quantity -> least error to state, from the finest grid alone.
     """
-    return {name: np.maximum(error, least.get(name, 0.0)) for name, error in differences.items()}
+    return {name: np.asarray(np.maximum(error, least.get(name, 0.0))) for name, error in differences.items()}
 
 
 def by_column(errors: Mapping[str, Array]) -> dict[str, Array]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ _RAMP, _HOLD, _PERIOD = 2.0, 3.0, 16.0
 
 
 def kept_times(
-    program: Program, times: int | Sequence[float] | None, *spacings: tuple[float, float]
+    program: Program, times: int | Sequence[Any] | None, *spacings: tuple[float, float]
 ) -> tuple[float, ...] | None:
     """Return the times to keep, ascending. [s]
 

@@ -128,6 +128,7 @@ class Loading(Experiment):
         before = (None, 0) if state is None else (state.enlarged, state.outgrown)
         profile, domain, enlarged, reaches_border = choose_surface(given, problem, program, *before)
         gap = np.ascontiguousarray(profile.gap[domain.cells])
+        assert settings.boundary != "auto", "resolved() replaces it"
         grid = Grid((gap.shape[0], gap.shape[1]), profile.spacing, settings.boundary, kernel=profile.kernel, xp=xp)
         memory = memory_of(body, program, settings, grid=grid, keeps_pressure=not domain.is_whole)
         log.info("memory: %s", memory.note)
@@ -138,7 +139,7 @@ class Loading(Experiment):
             program=program,
             kept=kept_times(program, settings.times, profile.spacing),
             tolerance=settings.tolerance,
-            time_step=None if settings.time_step == "auto" else settings.time_step,
+            time_step=None if isinstance(settings.time_step, str) else settings.time_step,
             present=None if profile.all_present else xp.asarray(profile.present[domain.cells]),
         )
         return LoadingRows(
@@ -157,7 +158,7 @@ class Loading(Experiment):
         if self.program.slides and settings.boundary != "periodic":
             yield "boundary", settings.boundary, "'periodic' for a program that slides (rv.mirror unfolds a surface)"
         end = self.program.duration
-        if settings.time_step != "auto" and settings.time_step < 4 * math.ulp(end):
+        if not isinstance(settings.time_step, str) and settings.time_step < 4 * math.ulp(end):
             resolution = f"at the end of the program, {end:g} s, times have a resolution of {math.ulp(end):.2g} s"
             yield "time_step", settings.time_step, f"a longer step: {resolution}"
 
@@ -233,7 +234,8 @@ class LoadingRows(Rows):
                 is_given = scene.time_step is not None or scene.program.segments[step.segment].slide is not None
                 kept = point.time in ends or is_given or stated["stated_error"] <= CHOSEN * scene.tolerance
             largest = so_far if kept else largest
-            values, fields = {}, {}
+            values: dict[str, Any] = {}
+            fields: dict[str, Array] = {}
             if step.is_end:
                 self.state = replace(self.state, march=step.state, largest=largest)
             # If hardly any compliance is instantaneous, the pressure of a step that is not kept belongs to the step and

@@ -7,11 +7,11 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import ConvergenceError, InputError
@@ -42,7 +42,7 @@ from roughvisc.experiment.problem import Problem
 from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.solver import contact_area
-from roughvisc.mechanics.grid import Boundary, arrays_of, to_host
+from roughvisc.mechanics.grid import arrays_of, to_host
 from roughvisc.mechanics.program import Direction
 from roughvisc.mechanics.steady_sliding import Sliding, SteadyState, steady_state
 from roughvisc.mechanics.tangential import slope
@@ -101,7 +101,7 @@ class SteadySliding(Experiment):
     direction: Direction = "x"
 
     axis: ClassVar[str] = "speed"
-    boundary: ClassVar[Boundary] = "periodic"
+    boundary: ClassVar[Literal["free", "periodic"] | None] = "periodic"
 
     def __post_init__(self) -> None:
         speeds = np.atleast_1d(np.asarray(self.speeds, dtype=object)).tolist()
@@ -118,8 +118,8 @@ class SteadySliding(Experiment):
     def __repr__(self) -> str:
         ends = dict.fromkeys(format_quantity(one, "m/s") for one in (min(self.speeds), max(self.speeds)))
         count = f"{len(self.speeds)} speeds from " if len(self.speeds) > 1 else ""
-        pressed = (self.load, "N") if self.load is not None else (self.pressure, "Pa")
-        return f"Steady sliding: {count}{' to '.join(ends)} along {self.direction}, under {format_quantity(*pressed)}"
+        pressed = format_quantity(self.pressure or 0.0, "Pa") if self.load is None else format_quantity(self.load, "N")
+        return f"Steady sliding: {count}{' to '.join(ends)} along {self.direction}, under {pressed}"
 
     def rows(self, problem: Problem, state: int | None = None, *, in_memory: bool = True) -> SlidingRows:
         """Return the steady states in the order of the speeds; the state is their number so far.
@@ -319,7 +319,7 @@ def sliding_grid_errors(
     if len(grids) == 1 or friction <= 0:
         return {VARIABLES[name].grid_error: math.nan for name in (*_COMPARED, "mean_contact_pressure")}
     ratio = max(many / few for many, few in zip(grid.gap.shape, grids[1].gap.shape, strict=True))
-    errors = {}
+    errors: dict[str, ArrayLike] = {}
     for name, values in zip(_COMPARED, np.transpose(runs), strict=True):
         near, far = np.append(np.abs(np.diff(values)) / max(abs(values[0]), 1e-300), math.nan)[:2]
         errors[name] = grid_uncertainty(name, near, far, ratio, moving=True)
@@ -340,7 +340,7 @@ def sliding_grid_errors(
         "mean_gap": hidden_gap / max(wide, 1e-300),
     }
     if not _is_resolved(contact):
-        errors["friction_force"] = np.float64(math.nan)
+        errors["friction_force"] = math.nan
     columns = by_column(at_least(errors, least))
     of_gap = VARIABLES["mean_gap"].grid_error
     columns[of_gap] = missing_of_zero(columns[of_gap], wide)

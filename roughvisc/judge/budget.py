@@ -353,6 +353,7 @@ def sources_of(
     if sample and cutoff is None:
         found[OCTAVE] = Source("cutoff is not given: the shortest wavelength that the real surface has", is_open=True)
     elif sample:
+        assert cutoff is not None
         end, shortest = unit_for(cutoff, "m").text(cutoff, 3), shortest_wave(height)
         found[OCTAVE] = Source(f"the grid holds all waves down to {end}")
         if is_narrow_band(height):

@@ -348,8 +348,9 @@ def timed_convolution(rows: Rows, touching: float) -> float:
     for _ in range(2):  # the first solve allocates memory
         began, before = time.thread_time(), grid.convolutions
         with suppress(ConvergenceError):
-            few = {"tolerance": 1e-11, "max_iterations": _ITERATIONS, "present": present}
-            solve_contact(grid, gap, load=load, start=start, **few)
+            solve_contact(
+                grid, gap, load=load, start=start, tolerance=1e-11, present=present, max_iterations=_ITERATIONS
+            )
         times.append((time.thread_time() - began) / max(grid.convolutions - before, 1))
     return min(times)
 
@@ -412,7 +413,7 @@ def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Availab
         "disk": _VARIABLES[kind] + disk(case, whole.size, rows, run.steps, part * float(run.contact.mean())),
         "note": note.strip(),
         "warning": warning,
-        "refusal": too_large(whole.shape, needed, there),
+        "refusal": too_large((whole.shape[0], whole.shape[1]), needed, there),
     }
 
 

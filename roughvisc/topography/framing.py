@@ -251,5 +251,5 @@ def mirror(h: xr.DataArray) -> xr.DataArray:
     """
     h = checked(h, "mirror")
     axes = [float(h[axis][0]) + np.arange(2 * h.sizes[axis]) * d for axis, d in zip("xy", spacing(h), strict=True)]
-    doubled = with_coordinates(np.pad(h.values, [(0, n) for n in h.shape], mode="symmetric"), *axes, h.attrs)
+    doubled = with_coordinates(np.pad(h.values, [(0, n) for n in h.shape], mode="symmetric"), axes[0], axes[1], h.attrs)
     return noted(doubled, MIRRORED, period=period_of(doubled))

@@ -224,9 +224,10 @@ def squared_slopes(h: xr.DataArray, periodic: bool = False, depth: float = math.
     z = np.pad(h.values, beyond, mode="wrap")
     along_x, along_y = (np.diff(z, axis=0) / dx) ** 2, (np.diff(z, axis=1) / dy) ** 2
     sides = slice(None, -1), slice(1, None)
-    at_x = at_y = lowest = None
+    lowest = None
     if depth < math.inf:
-        at_x, at_y = np.maximum(z[1:], z[:-1]), np.maximum(z[:, 1:], z[:, :-1])
+        at_x = np.maximum(z[1:], z[:-1])
+        at_y = np.maximum(z[:, 1:], z[:, :-1])
         lowest = np.nanmax(h.values) - depth
     corners = []
     for i, j in product(sides, sides):  # one after the other: together they take the memory of many fields
@@ -279,8 +280,8 @@ def pair(name: str, value: Any) -> tuple[float, float]:
 def counts(name: str, value: Any, low: int = 2) -> tuple[int, int]:
     """Return two whole numbers of cells; one number counts for both axes."""
     both = _both(value)
-    whole = len(both) == 2 and all(isinstance(n, Integral) and not isinstance(n, bool) and n >= low for n in both)
-    if not whole or both[0] * both[1] > MOST_CELLS:
+    whole = len(both) == 2 and all(isinstance(n, Integral) and not isinstance(n, bool) for n in both)
+    if not whole or min(both) < low or both[0] * both[1] > MOST_CELLS:
         expected = f"one or two whole numbers of cells of at least {low}, at most {MOST_CELLS:.3g} cells in all"
         raise InputError(key=name, found=value, expected=expected)
     return int(both[0]), int(both[1])

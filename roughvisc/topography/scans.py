@@ -260,7 +260,8 @@ def check_surface(table: Mapping[str, Any], where: str = "surface") -> None:
     recipe = one_of(f"{where}.generate", table["generate"], RECIPES) if source_key == "generate" else ""
     known = arguments(RECIPES[recipe]) if recipe else arguments(open_scan, 1)
     refuse_unknown(where, table, (source_key, *known, *step_keys, *place_keys))
-    condition(NoData(), steps, where)
+    no_data: Any = NoData()
+    condition(no_data, steps, where)
     if source_key == "generate":
         check_recipe(where, source)
     else:

@@ -221,7 +221,7 @@ def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | Non
     for axis, d, old, new in zip(("x", "y"), spacing(h), h.shape, shape, strict=True):
         axes.append(float(h[axis][0]) - d / 2 + (np.arange(new) + 0.5) * (d * old / new))
     line = f"resampled: {h.shape[0]} x {h.shape[1]} to {shape[0]} x {shape[1]} cells, {way}"
-    return noted(with_coordinates(heights, *axes, h.attrs), line, period=period)
+    return noted(with_coordinates(heights, axes[0], axes[1], h.attrs), line, period=period)
 
 
 @quantities(shortest="m > 0")

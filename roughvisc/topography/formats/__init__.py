@@ -115,9 +115,9 @@ def supported_formats() -> dict[str, Sequence[str]]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         from SurfaceTopography.IO import readers  # slow to import
-    known = {reader.format(): tuple(reader.file_extensions() or ()) for reader in readers}
-    known["di"] += ("di", "000 to 999")
-    known["jpk"] += ("jpk-qi-image",)
+    known: dict[str, Sequence[str]] = {reader.format(): tuple(reader.file_extensions() or ()) for reader in readers}
+    known["di"] = (*known["di"], "di", "000 to 999")
+    known["jpk"] = (*known["jpk"], "jpk-qi-image")
     known |= {name: theirs for name, (theirs, _) in READERS.items()}
     return dict(sorted(known.items()))
 

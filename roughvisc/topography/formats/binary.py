@@ -41,7 +41,7 @@ def read_x3p(path: Path) -> ScanFile:
     channels, sides = [], (content.header.x.increment, content.header.y.increment)
     for i, layer in enumerate(content.layers):
         heights, kind = layer.z.T, "height"
-        if content.feature_type == x3pio.FeatureType.POINT_CLOUD:
+        if content.feature_type == x3pio.FeatureType.POINT_CLOUD and layer.x is not None and layer.y is not None:
             heights, kind = np.stack([layer.x, layer.y, layer.z], axis=-1).reshape(-1, 3), "points"
         elif heights.ndim < 2 or not layer.is_regular_grid:
             kind = "a profile, or a map on absolute axes"
