@@ -26,7 +26,9 @@ from roughvisc.variables import ROW, ROWS, VARIABLES, axis_of
 ATTRIBUTES = "attributes"
 #: Group of the steps in a result's file, and its title; and the key of the steps in the encoding of a result, or of the
 #: function from the key of a case to its steps in the encoding of a sweep.
-STEPS, TITLE, CARRIED = "steps", "histories of every accepted step", "roughvisc_steps"
+STEPS = "steps"
+TITLE = "histories of every accepted step"
+CARRIED = "roughvisc_steps"
 #: Prefix of a method -> module of its function, which lies in a higher layer and is imported at its first use.
 _ROOMS = {"": "roughvisc.observables", "plot_": "roughvisc.plot"}
 
@@ -61,7 +63,8 @@ def label(dataset: xr.Dataset) -> xr.Dataset:
     """
     if ROW in dataset.dims and (axis := axis_of(dataset.variables)) in dataset.coords:
         dataset = dataset.where(dataset[axis].notnull())
-    declared, converted = {}, {}
+    declared = {}
+    converted = {}
     for name, variable in dataset.variables.items():
         if name in VARIABLES or name in dataset.data_vars:
             declared[name] = VARIABLES[str(name)]
@@ -188,7 +191,8 @@ def steps_of(result: xr.Dataset) -> xr.Dataset | None:
     steps.
     """
     result = of_one_case(result)
-    steps, named = result.encoding.get(CARRIED), {"time", "force"} <= result.variables.keys()
+    steps = result.encoding.get(CARRIED)
+    named = {"time", "force"} <= result.variables.keys()
     if callable(steps):
         key = str(result.attrs.get("case_key", ""))
         steps = steps(key) if key else None
@@ -253,7 +257,8 @@ class ResultAccessor:
 
     def __getattr__(self, name: str) -> Any:
         start = "plot_" if name.startswith("plot_") else ""
-        room, function = import_module(_ROOMS[start]), name.removeprefix(start)
+        room = import_module(_ROOMS[start])
+        function = name.removeprefix(start)
         if function not in room.__all__:
             raise AttributeError(f"the accessor roughvisc has no {name!r}")
         method = partial(getattr(room, function), self._dataset)

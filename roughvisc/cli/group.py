@@ -114,7 +114,8 @@ def _terminate(number: int, _: Any) -> None:
 def _settings_of_process() -> Iterator[None]:
     """Show warnings as messages and treat SIGTERM as an interrupt."""
     usual = logging.lastResort, warnings.showwarning, signal.signal(signal.SIGTERM, _terminate)
-    logging.lastResort, warnings.showwarning = _Screen(), lambda warning, *_: complain(f"warning: {warning}")
+    logging.lastResort = _Screen()
+    warnings.showwarning = lambda warning, *_: complain(f"warning: {warning}")
     try:
         yield
     finally:

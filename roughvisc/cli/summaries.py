@@ -82,7 +82,8 @@ def result_table(dataset: xr.Dataset) -> Group:
             rows.append((f"{variable.label} {where}", text))
         if name == "contact_area" and name in row and not axis.telling:
             most = dataset.isel({axis.name: int(np.argmax(dataset[name].values))})
-            text, place = readable(float(most[name]), "m^2"), axis.place(float(most[axis.name]), 3)
+            text = readable(float(most[name]), "m^2")
+            place = axis.place(float(most[axis.name]), 3)
             if text != readable(float(row[name]), "m^2"):
                 rows.append((f"Largest {VARIABLES[name].label.lower()}", f"{text} at {place}"))
     seconds, convolutions = cost_of(dataset)
@@ -132,7 +133,9 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Group:
     name : str
         Name of the file.
     """
-    counts, sides, missing = height.shape, spacing(height), int(height.isnull().sum())
+    counts = height.shape
+    sides = spacing(height)
+    missing = int(height.isnull().sum())
     stated = ("format", "instrument", "channel", "other_channels", "orientation")
     rows = [(key.capitalize().replace("_", " "), height.attrs.get(key, "")) for key in stated]
     rows += [

@@ -597,8 +597,12 @@ def budget(
     --------
     roughvisc.audit : the assumptions of the model.
     """
-    given = dict(locals())
-    known = {name: given[name] for name in KNOWN}
+    known = {
+        "modulus_error": modulus_error,
+        "time_scale_error": time_scale_error,
+        "cutoff": cutoff,
+        "population": population,
+    }
     names = listed_names(quantity)
     if not names:
         raise InputError(key="quantity", found=quantity, expected="at least one")

@@ -109,7 +109,16 @@ def open_scan(
         If the checksum in an X3P file is wrong, an index row or column is removed, a number is taken for missing
         points, or cells of `grid` hold no point.
     """
-    given = {key: value for key, value in locals().items() if key != "path" and value is not None}
+    options = {
+        "format": format,
+        "channel": channel,
+        "unit": unit,
+        "spacing": spacing,
+        "grid": grid,
+        "no_data": no_data,
+        "height_scale": height_scale,
+    }
+    given = {key: value for key, value in options.items() if value is not None}
     path = existing(path)
     if not is_card(path):
         return read_file(path, given)
