@@ -3,9 +3,10 @@
     python docs/make_gallery.py [STUDY ...]
 
 writes gallery.md, small PNG files, and with ``quickstart`` the README's picture. It draws only the studies named (default: all),
-and runs the notebook ``first_contact`` if it is named or nothing is.
+and runs the notebook ``first_contact`` if it is named or nothing is. A picture is written only if a pixel of it has changed.
 """
 
+import io
 import sys
 import tempfile
 import tomllib
@@ -95,6 +96,21 @@ def by_load(results):
     }
 
 
+def save_changed(figure, path, dpi):
+    """Write a figure as a small picture, unless the file has the same pixels already."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=dpi)
+    picture = Image.open(stream).convert("RGB")
+    if path.exists():
+        with Image.open(path) as before:
+            if (
+                before.size == picture.size
+                and before.convert("RGB").tobytes() == picture.tobytes()
+            ):
+                return
+    picture.save(path, optimize=True)
+
+
 def draw(name, folder):
     """Run one study and write its figures, small."""
     study = WORKFLOWS / f"{name}.toml"
@@ -105,11 +121,8 @@ def draw(name, folder):
         else:
             ds = rv.run(study, results, progress=False)
         for kind, figure in FIGURES[name].items():
-            path = folder / f"{name}-{kind}.png"
-            figure(ds).savefig(path, dpi=100)
+            save_changed(figure(ds), folder / f"{name}-{kind}.png", dpi=100)
             ds.close()
-            with Image.open(path) as picture:
-                picture.convert("RGB").save(path, optimize=True)
     xr.backends.file_manager.FILE_CACHE.clear()
 
 
@@ -118,11 +131,9 @@ def draw_readme(study="quickstart"):
     path = HERE / "figures" / f"{study}.png"
     with tempfile.TemporaryDirectory() as folder:
         ds = rv.run(WORKFLOWS / f"{study}.toml", folder, progress=False)
-        rv.plot.maps(ds).savefig(path, dpi=120)
+        save_changed(rv.plot.maps(ds), path, dpi=120)
         ds.close()
     xr.backends.file_manager.FILE_CACHE.clear()
-    with Image.open(path) as picture:
-        picture.convert("RGB").save(path, optimize=True)
 
 
 def page():

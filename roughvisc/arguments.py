@@ -79,7 +79,8 @@ def check_keys(function: Callable[..., Any], where: str, table: Mapping[str, Any
     for key, (hint, default) in known.items():
         if (key not in table and default is not inspect.Parameter.empty) or (key in table and suits(table[key], hint)):
             continue
-        name, expected = dotted(where, key), in_words(hint, units_of(function).get(key, "1"))
+        name = dotted(where, key)
+        expected = in_words(hint, units_of(function).get(key, "1"))
         if key not in table:
             raise InputError(f"{name}: missing: expected {expected}", key=name, expected=expected)
         raise InputError(key=name, found=table[key], expected=expected)
@@ -130,7 +131,8 @@ def refuse_unknown(where: str, table: Mapping[str, Any], known: Iterable[str]) -
     """Refuse a table with an unknown key."""
     for key in table:
         if key not in known:
-            name, expected = dotted(where, key), f"one of {', '.join(known)}" if known else "no key"
+            name = dotted(where, key)
+            expected = f"one of {', '.join(known)}" if known else "no key"
             raise InputError(f"{name}: unknown key{nearest(key, known)}", key=name, found=table[key], expected=expected)
 
 
@@ -147,13 +149,13 @@ def nearest(word: Any, known: Iterable[str], otherwise: str | None = None) -> st
 def one_key(where: str, table: Mapping[str, Any], keys: Iterable[str]) -> str:
     """Return the only one of some keys in a table; refuse a table with none or several."""
     keys = list(keys)
-    found = table.keys() & keys
-    if len(found) != 1:
+    named = table.keys() & keys
+    if len(named) != 1:
         expected = f"exactly one of {', '.join(keys)}"
-        hint = "" if found else next(filter(None, (nearest(key, keys, "") for key in table)), "")
+        hint = "" if named else next(filter(None, (nearest(key, keys, "") for key in table)), "")
         message = f"{where}: found {short_repr(table)}: expected {expected}{hint}"
         raise InputError(message, key=where, found=table, expected=expected)
-    return found.pop()
+    return named.pop()
 
 
 def one_of(key: str, value: Any, words: Iterable[Any]) -> Any:
@@ -210,7 +212,8 @@ def suits(value: Any, hint: Any) -> bool:
     >>> suits(2, float | None), suits(True, float), suits("2 m", float | str), suits([1, 2], tuple[float, float])
     (True, False, True, True)
     """
-    kind, inner = get_origin(hint), get_args(hint)
+    kind = get_origin(hint)
+    inner = get_args(hint)
     if kind in (Union, types.UnionType):
         return any(map(partial(suits, value), inner))
     if kind is Literal:
@@ -241,7 +244,8 @@ def in_words(hint: Any, unit: str = "1") -> str:
     >>> in_words(float | str | None, "Pa"), in_words(Literal["x", "y"]), in_words(Sequence[float])
     ('a number [Pa], or text with a unit', "'x' or 'y'", 'a list')
     """
-    kind, inner = get_origin(hint), [one for one in get_args(hint) if one is not type(None)]
+    kind = get_origin(hint)
+    inner = [one for one in get_args(hint) if one is not type(None)]
     if kind is Literal:
         return " or ".join(map(repr, inner))
     if kind in (Union, types.UnionType):

@@ -66,7 +66,9 @@ class InputError(RoughviscError, ValueError):
             message = f"{key}: " if key else ""
             message += f"found {short_repr(found)}: expected {expected}"
         super().__init__(message, transient=transient)
-        self.key, self.found, self.expected = key, found, expected
+        self.key = key
+        self.found = found
+        self.expected = expected
 
     def prefixed(self, text: str) -> Self:
         """Return this error with a file, table or key in front of its message."""

@@ -20,13 +20,15 @@ import numpy as np
 import xarray as xr
 
 from roughvisc.errors import InputError
-from roughvisc.variables import ERRORS, GRID_ERROR, ROW, ROWS, VARIABLES, axis_of
+from roughvisc.variables import ROW, ROWS, VARIABLES, axis_of
 
 #: Coordinate of a sweep with the attributes in which the files of its cases differ, as JSON.
 ATTRIBUTES = "attributes"
 #: Group of the steps in a result's file, and its title; and the key of the steps in the encoding of a result, or of the
 #: function from the key of a case to its steps in the encoding of a sweep.
-STEPS, TITLE, CARRIED = "steps", "histories of every accepted step", "roughvisc_steps"
+STEPS = "steps"
+TITLE = "histories of every accepted step"
+CARRIED = "roughvisc_steps"
 #: Prefix of a method -> module of its function, which lies in a higher layer and is imported at its first use.
 _ROOMS = {"": "roughvisc.observables", "plot_": "roughvisc.plot"}
 
@@ -61,17 +63,18 @@ def label(dataset: xr.Dataset) -> xr.Dataset:
     """
     if ROW in dataset.dims and (axis := axis_of(dataset.variables)) in dataset.coords:
         dataset = dataset.where(dataset[axis].notnull())
-    declared, converted = {}, {}
+    declared = {}
+    converted = {}
     for name, variable in dataset.variables.items():
         if name in VARIABLES or name in dataset.data_vars:
             declared[name] = VARIABLES[str(name)]
             if variable.dtype.kind not in "fUO" and variable.dtype != declared[name].dtype:
                 converted[name] = variable.astype(declared[name].dtype)
     labelled = dataset.assign(converted) if converted else dataset.copy()  # once: each assignment merges the whole
-    for name, one in declared.items():
+    for name, declaration in declared.items():
         attributes = labelled.variables[name].attrs
-        attributes.update(one.attributes)
-        if errors := " ".join(filter(dataset.__contains__, ERRORS[str(name)])):
+        attributes.update(declaration.attributes)
+        if errors := " ".join(filter(dataset.__contains__, declaration.errors)):
             attributes["ancillary_variables"] = errors
     return labelled
 
@@ -95,12 +98,38 @@ def grid_error_of(results: Iterable[Mapping[Any, Any]]) -> str:
     >>> grid_error_of([{"grid_error": [0.709, 0.02]}]), grid_error_of([{"force": [1.0]}])
     ('71 % of the pressure', 'not estimated (grid_error = true in [solve])')
     """
-    found = list(results)
-    for quantity, name in (("pressure", GRID_ERROR["pressure"]), ("friction", GRID_ERROR["friction_force"])):
-        if errors := [np.ravel(one[name]) for one in found if np.size(one.get(name, ()))]:
+    known = list(results)
+    for quantity in ("pressure", "friction_force"):
+        name = VARIABLES[quantity].grid_error
+        if errors := [np.ravel(result[name]) for result in known if np.size(result.get(name, ()))]:
             largest = np.fmax.reduce(np.concatenate(errors))
-            return "not known" if math.isnan(largest) else f"{100 * largest:.2g} % of the {quantity}"
+            of_quantity = f"% of the {quantity.removesuffix('_force')}"
+            return "not known" if math.isnan(largest) else f"{100 * largest:.2g} {of_quantity}"
     return "not estimated (grid_error = true in [solve])"
+
+
+def error_of(rows: xr.Dataset, name: str) -> xr.DataArray | None:
+    """Return the stated error of a quantity at each row, in its unit: of steps and solver, and of the grid.
+
+    None if the rows have neither. An error of the grid is relative to the largest row over time, and to the same row
+    over speed.
+
+    Parameters
+    ----------
+    rows : xarray.Dataset
+        All rows of a result.
+    name : str
+        Variable over the rows.
+    """
+    if name not in VARIABLES:
+        return None
+    parts = []
+    if VARIABLES[name].error in rows:
+        parts.append(rows[VARIABLES[name].error])
+    if VARIABLES[name].grid_error in rows:
+        size = abs(rows[name])
+        parts.append(rows[VARIABLES[name].grid_error] * (size.max() if axis_of(rows.variables) == "time" else size))
+    return sum(parts[1:], parts[0]) if parts else None
 
 
 def expect_declared_units(dataset: xr.Dataset) -> None:
@@ -163,7 +192,8 @@ def steps_of(result: xr.Dataset) -> xr.Dataset | None:
     steps.
     """
     result = of_one_case(result)
-    steps, named = result.encoding.get(CARRIED), {"time", "force"} <= result.variables.keys()
+    steps = result.encoding.get(CARRIED)
+    named = {"time", "force"} <= result.variables.keys()
     if callable(steps):
         key = str(result.attrs.get("case_key", ""))
         steps = steps(key) if key else None
@@ -228,7 +258,8 @@ class ResultAccessor:
 
     def __getattr__(self, name: str) -> Any:
         start = "plot_" if name.startswith("plot_") else ""
-        room, function = import_module(_ROOMS[start]), name.removeprefix(start)
+        room = import_module(_ROOMS[start])
+        function = name.removeprefix(start)
         if function not in room.__all__:
             raise AttributeError(f"the accessor roughvisc has no {name!r}")
         method = partial(getattr(room, function), self._dataset)

@@ -9,8 +9,9 @@ import stat
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BufferedReader
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from roughvisc.errors import InputError
 
@@ -89,7 +90,7 @@ def flaw_of(path: Path) -> str:
 
 
 @contextmanager
-def opened(path: Path, expected: str = "a file") -> Iterator[BinaryIO]:
+def opened(path: Path, expected: str = "a file") -> Iterator[BufferedReader]:
     """Open a regular file for reading.
 
     Raises

@@ -26,7 +26,7 @@ from roughvisc.experiment.problem import Problem
 from roughvisc.labels import CARRIED, TITLE, label
 from roughvisc.mechanics.grid import transform_library
 from roughvisc.topography.grid import nominal_area
-from roughvisc.variables import OF_STEPS, STEP, STEPPED, VARIABLES
+from roughvisc.variables import STEP, STEPPED, VARIABLES
 from roughvisc.version import program_version
 
 log = logging.getLogger("roughvisc")
@@ -141,8 +141,9 @@ def solve(
         raise InputError(key="threads", found=threads, expected="a whole number of at least 1, or None")
     problem = experiment.resolved(problem)
     height, settings = problem.height, problem.settings
-    runs_again = settings.grid_error and isinstance(experiment, Loading)  # a curve of steady sliding does so itself
-    needed = ("pressure",) if runs_again and "pressure" not in settings.fields else ()
+    # a curve of steady sliding does so itself
+    loading = experiment if settings.grid_error and isinstance(experiment, Loading) else None
+    needed = ("pressure",) if loading and "pressure" not in settings.fields else ()
     problem = replace(problem, settings=replace(settings, fields=(*settings.fields, *needed)))
     bar: AbstractContextManager[Progress | None] = nullcontext(progress if callable(progress) else None)
     if progress is True:
@@ -152,9 +153,9 @@ def solve(
     with fft.set_workers(threads):
         with bar as report:
             dataset = solve_on_grid(problem, experiment, recorder or Recorder(), report)
-        if runs_again:
+        if loading is not None:
             # coarser grids may have another area: convert nominal pressures to loads on the given area
-            loads = Loading(experiment.program.on_area(nominal_area(height)))
+            loads = Loading(loading.program.on_area(nominal_area(height)))
 
             def on_coarser(few: xr.DataArray, times: list[float]) -> xr.Dataset:
                 coarse = replace(problem, height=few, settings=replace(settings, fields=("pressure",), times=times))
@@ -164,8 +165,9 @@ def solve(
 
             dataset = with_grid_error(dataset, height, on_coarser).drop_vars(needed)
     if experiment.axis == "time":
-        dataset = dataset.drop_vars(OF_STEPS, errors="ignore")
-    return label(dataset[sorted(dataset.data_vars, key=list(VARIABLES).index)])  # main results first
+        of_steps = [name for name, variable in VARIABLES.items() if variable.is_of_steps]
+        dataset = dataset.drop_vars(of_steps, errors="ignore")
+    return label(dataset[sorted(dataset.data_vars, key=list[Any](VARIABLES).index)])  # main results first
 
 
 def solve_on_grid(
@@ -252,8 +254,9 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
         every = {}
         for name in ("time", *STEPPED):
             if name in steps[0]:
-                values = list(map(itemgetter(name), steps))
-                values = np.diff(values, prepend=0) if name == "convolutions" else values
-                every[name] = STEP, np.array(values, VARIABLES[name].dtype)
+                values = np.array(list(map(itemgetter(name), steps)))
+                if name == "convolutions":
+                    values = np.diff(values, prepend=0)
+                every[name] = STEP, values.astype(VARIABLES[name].dtype)
         dataset.encoding[CARRIED] = label(xr.Dataset(every, attrs={"title": TITLE}).set_coords("time"))
     return dataset

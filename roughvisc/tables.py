@@ -479,8 +479,8 @@ def _export_heading(
                         )
                 return above, separator, heading, {key: found[0] for key, found in positions.items()}
     expected = f"a line with the names {', '.join(map(repr, needed))}"
-    found = f"found no {best[1][0]!r} in line {best[0]}, {best[2][:100]!r}" if best[1] else "found no such line"
-    raise InputError(f"{path}: {found}: expected {expected}", found=found, expected=expected)
+    absent = f"found no {best[1][0]!r} in line {best[0]}, {best[2][:100]!r}" if best[1] else "found no such line"
+    raise InputError(f"{path}: {absent}: expected {expected}", found=absent, expected=expected)
 
 
 class _ExportTable:

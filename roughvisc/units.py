@@ -253,7 +253,9 @@ def quantities(**units: str) -> Callable[[_Taking], _Taking]:
                 elif not limit or (value is None and taking.parameters[name].default is None):
                     bound.arguments[name] = in_si(value, unit, name)
                 else:
-                    bound.arguments[name] = number(value, unit, name, **{"least" if limit == "= 0" else "above": 0.0})
+                    bound.arguments[name] = (
+                        number(value, unit, name, least=0.0) if limit == "= 0" else number(value, unit, name, above=0.0)
+                    )
             return function(*bound.args, **bound.kwargs)
 
         called.quantities = {name: unit for name, (unit, _) in declared.items()}  # type: ignore[attr-defined]

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -47,6 +47,20 @@ class Variable:
         As in the file of a result.
     meanings : tuple of str
         Meanings of the values 0, 1, ... of a flag.
+    error : str
+        Variable with its stated error, in the same unit; empty if none is stated.
+    grid_error : str
+        Variable with its relative error due to the grid; empty if none is estimated. Quantities in a constant ratio
+        share it.
+    missing : str
+        When the value does not exist: it is then NaN. A variable without this text is never NaN in a result.
+    table : {"", "value", "largest"}
+        What tables of cases and summaries contain: nothing, the value in the row that represents the case, with its
+        errors, or the largest value of all rows.
+    is_panel : bool
+        Whether :func:`roughvisc.plot.history` draws it by default.
+    is_of_steps : bool
+        Whether a result over time has it at its accepted steps alone, in the group ``steps``.
     """
 
     dims: tuple[str, ...]
@@ -55,6 +69,22 @@ class Variable:
     comment: str = ""
     dtype: str = "float64"
     meanings: tuple[str, ...] = ()
+    error: str = ""
+    grid_error: str = ""
+    missing: str = ""
+    table: Literal["", "value", "largest"] = ""
+    is_panel: bool = False
+    is_of_steps: bool = False
+
+    @property
+    def errors(self) -> tuple[str, ...]:
+        """Variables with its errors."""
+        return tuple(filter(None, (self.error, self.grid_error)))
+
+    @property
+    def remarks(self) -> str:
+        """Comment, and when the value is missing."""
+        return "; ".join(filter(None, (self.comment, self.missing and f"missing {self.missing}")))
 
     @property
     def label(self) -> str:
@@ -68,27 +98,33 @@ class Variable:
     @cached_property
     def attributes(self) -> dict[str, Any]:
         """The CF attributes."""
-        names = ("long_name", "units", "comment")
-        found: dict[str, Any] = {name: value for name in names if (value := getattr(self, name))}
+        texts = {"long_name": self.long_name, "units": self.units, "comment": self.remarks}
+        attributes: dict[str, Any] = {name: text for name, text in texts.items() if text}
         if self.meanings:
-            found["flag_values"] = np.arange(len(self.meanings), dtype=self.dtype)
-            found["flag_meanings"] = " ".join(self.meanings)
-        return found
+            attributes["flag_values"] = np.arange(len(self.meanings), dtype=self.dtype)
+            attributes["flag_meanings"] = " ".join(self.meanings)
+        return attributes
 
 
-#: Comments of several variables.
+#: Comments of several variables, and when several are missing.
 _COARSER = "bound in practice, from a coarser grid; relative to the largest row over time, to the same row over speed"
 _SPOTS = "of the contact spots between half-spaces; infinite in full contact; the gap does not conduct"
 _FLUX = "of the fluid, over the height of the gap; zero in contact and without flow"
 _SOLVER = "of the solution on this grid alone: without the errors of the grid and of the gap"
 _BOTH = "of the grid and of the solver"
 _PERSSON = "by Persson's theory of the same waves"
-_ASPERITIES = "at the rms slope of the surface; missing once the load has fallen"
+_ASPERITIES = "at the rms slope of the surface"
+_NO_ESTIMATE = "if the coarser grid has no solution, or the quantity is zero but for its error"
+_ABSENT = "where the profile is absent"
+_FALLEN = "once the load has fallen"
+_CUT_OFF = "without an upper limit"
 
 VARIABLES: dict[str, Variable] = {
     # coordinates; no standard_name "time", which in CF is a date
-    "time": Variable(_STEPS, "s", "time", "since the start of the program; at a jump the state after it"),
-    "speed": Variable(_SERIES, "m/s", "speed", "of steady sliding"),
+    "time": Variable(
+        _STEPS, "s", "time", "since the start of the program; at a jump the state after it", table="value"
+    ),
+    "speed": Variable(_SERIES, "m/s", "speed", "of steady sliding", table="value"),
     "x": Variable(("x",), "m", "x", "of the cell centre"),
     "y": Variable(("y",), "m", "y", "of the cell centre"),
     "case_key": Variable((), "", "key of the case", "name of its file", dtype="str"),
@@ -96,34 +132,105 @@ VARIABLES: dict[str, Variable] = {
         (), "", "attributes of the file", "of a case of a sweep: those that differ, JSON", dtype="str"
     ),
     # surface
-    "height": Variable(_GRID, "m", "height", "of the rigid profile, peaks up; attribute `highest`: its apex [m]"),
+    "height": Variable(
+        _GRID, "m", "height", "of the rigid profile, peaks up; attribute `highest`: its apex [m]", missing=_ABSENT
+    ),
     "filled": Variable(_GRID, "", "filled points", dtype="int8", meanings=("measured", "filled")),
     # fields
-    "pressure": Variable(_FRAME, "Pa", "pressure", "of the contact, mean over the cell"),
-    "gap": Variable(_FRAME, "m", "gap", "between the surfaces at the cell centre; missing where the profile is absent"),
+    "pressure": Variable(_FRAME, "Pa", "pressure", "of the contact, mean over the cell", grid_error="grid_error"),
+    "gap": Variable(_FRAME, "m", "gap", "between the surfaces at the cell centre", missing=_ABSENT),
     "displacement": Variable(_FRAME, "m", "displacement", "into the body; of zero mean unless space is free"),
     # histories
-    "force": Variable(_STEPS, "N", "force", "normal force"),
+    "force": Variable(_STEPS, "N", "force", "normal force", error="force_error", table="value", is_panel=True),
     "approach": Variable(
         _STEPS,
         "m",
         "approach",
         "of the rigid profile since first touch of its highest point; in free space against the undeformed plane, "
         "otherwise against the mean plane of the body; of an open contact the value at which it would just close",
+        error="approach_error",
+        grid_error="grid_error_approach",
+        table="value",
+        is_panel=True,
     ),
-    "nominal_pressure": Variable(_STEPS, "Pa", "nominal pressure", "force over the area of all cells, absent ones too"),
-    "work": Variable(_STEPS, "J", "work", "of the force on the approach; if periodic without the uniform displacement"),
-    "contact_area": Variable(_STEPS, "m^2", "contact area", "without the excess of the staircase of cells at its edge"),
-    "contact_area_counted": Variable(_STEPS, "m^2", "contact area, counted", "cells that carry pressure"),
-    "contact_fraction": Variable(_STEPS, "1", "contact fraction", "over the area of all cells, absent ones too"),
-    "mean_gap": Variable(_STEPS, "m", "mean gap", "over the present cells"),
+    "nominal_pressure": Variable(
+        _STEPS,
+        "Pa",
+        "nominal pressure",
+        "force over the area of all cells, absent ones too",
+        table="value",
+        is_of_steps=True,
+    ),
+    "contact_area": Variable(
+        _STEPS,
+        "m^2",
+        "contact area",
+        "without the excess of the staircase of cells at its edge",
+        error="contact_area_error",
+        grid_error="grid_error_area",
+        table="value",
+        is_panel=True,
+    ),
+    "contact_area_counted": Variable(
+        _STEPS, "m^2", "contact area, counted", "cells that carry pressure", is_of_steps=True
+    ),
+    "contact_fraction": Variable(
+        _STEPS,
+        "1",
+        "contact fraction",
+        "over the area of all cells, absent ones too",
+        grid_error="grid_error_area",
+        table="value",
+    ),
+    "mean_contact_pressure": Variable(
+        _STEPS,
+        "Pa",
+        "mean contact pressure",
+        "force over the contact area",
+        error="mean_contact_pressure_error",
+        grid_error="grid_error_mean_pressure",
+        missing="without contact",
+        table="value",
+    ),
+    "mean_gap": Variable(
+        _STEPS, "m", "mean gap", "over the present cells", grid_error="grid_error_gap", table="value", is_panel=True
+    ),
+    "work": Variable(
+        _STEPS,
+        "J",
+        "work",
+        "of the force on the approach; if periodic without the uniform displacement",
+        error="work_error",
+        is_panel=True,
+    ),
     # sliding
-    "sliding_distance": Variable(_STEPS, "m", "sliding distance", "since the start, along the path, in whole cells"),
+    "sliding_distance": Variable(
+        _STEPS, "m", "sliding distance", "since the start, along the path, in whole cells", table="value"
+    ),
     "reduced_speed": Variable(_SERIES, "m/s", "reduced speed a_T V", "speed times the shift factor of the material"),
-    "friction_coefficient": Variable(_STEPS, "1", "friction coefficient", "over the normal force; missing while apart"),
-    "friction_force": Variable(_STEPS, "N", "friction force", "against the motion, in a hold against the last motion"),
-    "friction_force_across": Variable(_STEPS, "N", "force across the motion", "to the left of the motion"),
-    "friction_force_error": Variable(_SERIES, "N", "stated error of the friction force", "of steps of one cell"),
+    "friction_coefficient": Variable(
+        _STEPS,
+        "1",
+        "friction coefficient",
+        "over the normal force",
+        error="friction_coefficient_error",
+        grid_error="grid_error_friction",
+        missing="while apart",
+        table="value",
+        is_panel=True,
+    ),
+    "friction_force": Variable(
+        _STEPS,
+        "N",
+        "friction force",
+        "against the motion, in a hold against the last motion",
+        error="friction_force_error",
+        grid_error="grid_error_friction",
+        table="value",
+    ),
+    "friction_force_across": Variable(
+        _STEPS, "N", "force across the motion", "to the left of the motion", table="value", is_of_steps=True
+    ),
     # accuracy and cost
     "stated_error": Variable(
         _SERIES,
@@ -131,47 +238,138 @@ VARIABLES: dict[str, Variable] = {
         "numerical error",
         "largest of pressure (L1), force and approach, over the largest of the rows so far: steps, solver and series; "
         "of steady sliding pressure (L1) and friction, by the iteration; without the grid",
+        table="largest",
     ),
-    "time_error": Variable(_STEPS, "1", "error of the time steps", "part of stated_error"),
-    "residual": Variable(_STEPS, "1", "error of the contact solver", "part of stated_error"),
+    "time_error": Variable(_STEPS, "1", "error of the time steps", "part of stated_error", is_of_steps=True),
+    "residual": Variable(_STEPS, "1", "error of the contact solver", "part of stated_error", is_of_steps=True),
+    "force_error": Variable(_SERIES, "N", "stated error of the force", "zero if the load is prescribed"),
     "approach_error": Variable(_SERIES, "m", "stated error of the approach", "zero if the approach is prescribed"),
     "work_error": Variable(_SERIES, "J", "stated error of the work", "adds up over the steps; without the grid"),
     "contact_area_error": Variable(_SERIES, "m^2", "stated error of the area", "of uncertain cells; without the grid"),
-    "grid_error": Variable(_SERIES, "1", "grid error", f"largest of pressure (L1), force, approach; {_COARSER}"),
-    "grid_error_approach": Variable(_SERIES, "1", "grid error of the approach", _COARSER),
-    "grid_error_gap": Variable(_SERIES, "1", "grid error of the gap", f"mean gap; {_COARSER}"),
-    "grid_error_area": Variable(_SERIES, "1", "grid error of the area", _COARSER),
-    "grid_error_friction": Variable(_SERIES, "1", "grid error of friction", f"missing below three cells; {_COARSER}"),
-    "status": Variable(_STEPS, "", "how the step ended", dtype="int8", meanings=STATUS_MEANINGS),
-    "convolutions": Variable(_STEPS, "1", "convolutions", "since the last step, or of the speed", dtype="int32"),
-    "wall_time": Variable(_STEPS, "s", "wall time", "since the start of the run"),
+    "mean_contact_pressure_error": Variable(
+        _SERIES,
+        "Pa",
+        "stated error of the mean contact pressure",
+        "from the errors of force and area",
+        missing=_CUT_OFF,
+    ),
+    "friction_coefficient_error": Variable(
+        _SERIES,
+        "1",
+        "stated error of the friction coefficient",
+        "from the errors of both forces",
+        missing=_CUT_OFF,
+    ),
+    "friction_force_error": Variable(
+        _SERIES, "N", "stated error of the friction force", "of steps of one cell; over speed stated_error of it"
+    ),
+    "grid_error": Variable(
+        _SERIES,
+        "1",
+        "grid error",
+        f"largest of pressure (L1), force, approach; {_COARSER}",
+        missing=_NO_ESTIMATE,
+        table="largest",
+    ),
+    "grid_error_approach": Variable(
+        _SERIES, "1", "grid error of the approach", _COARSER, missing=_NO_ESTIMATE, table="largest"
+    ),
+    "grid_error_gap": Variable(
+        _SERIES, "1", "grid error of the gap", f"mean gap; {_COARSER}", missing=_NO_ESTIMATE, table="largest"
+    ),
+    "grid_error_area": Variable(
+        _SERIES, "1", "grid error of the area", _COARSER, missing=_NO_ESTIMATE, table="largest"
+    ),
+    "grid_error_mean_pressure": Variable(
+        _SERIES,
+        "1",
+        "grid error of the mean contact pressure",
+        f"from those of force and area; {_COARSER}",
+        missing=f"{_NO_ESTIMATE}, or the area may be zero",
+        table="largest",
+    ),
+    "grid_error_friction": Variable(
+        _SERIES,
+        "1",
+        "grid error of friction",
+        _COARSER,
+        missing=f"below three cells, {_NO_ESTIMATE}",
+        table="largest",
+    ),
+    "status": Variable(_STEPS, "", "how the step ended", dtype="int8", meanings=STATUS_MEANINGS, is_of_steps=True),
+    "convolutions": Variable(
+        _STEPS, "1", "convolutions", "since the last step, or of the speed", dtype="int32", is_of_steps=True
+    ),
+    "wall_time": Variable(_STEPS, "s", "wall time", "since the start of the run", is_of_steps=True),
     # observables: contact and gap
     "cluster_count": Variable(_SERIES, "1", "number of contact clusters", dtype="int64"),
-    "cluster_area_mean": Variable(_SERIES, "m^2", "mean area of a contact cluster", "its cells, counted"),
-    "cluster_area_largest": Variable(_SERIES, "m^2", "area of the largest contact cluster", "its cells, counted"),
+    "cluster_area_mean": Variable(
+        _SERIES, "m^2", "mean area of a contact cluster", "its cells, counted", missing="without contact"
+    ),
+    "cluster_area_largest": Variable(
+        _SERIES, "m^2", "area of the largest contact cluster", "its cells, counted", missing="without contact"
+    ),
     "pressure_bin": Variable(("pressure_bin",), "Pa", "pressure at the middle of a bin"),
     "gap_bin": Variable(("gap_bin",), "m", "gap at the middle of a bin"),
-    "pressure_density": Variable((ROW, "pressure_bin"), "1/Pa", "probability density of the pressure", "in contact"),
-    "gap_density": Variable((ROW, "gap_bin"), "1/m", "probability density of the gap", "out of contact"),
+    "pressure_density": Variable(
+        (ROW, "pressure_bin"),
+        "1/Pa",
+        "probability density of the pressure",
+        "in contact",
+        missing="without contact",
+    ),
+    "gap_density": Variable(
+        (ROW, "gap_bin"), "1/m", "probability density of the gap", "out of contact", missing="in full contact"
+    ),
     "cycle": Variable(("cycle",), "1", "number of the loading cycle", "counted from 1", dtype="int64"),
     "cycle_start": Variable(("cycle",), "s", "time at which the cycle starts"),
     "cycle_work": Variable(("cycle",), "J", "work done by the force in the cycle"),
     # observables: leakage
-    "leak_rate": Variable(_SERIES, "m^3/s", "leak rate", "volume of fluid in unit time, by the pressure drop"),
+    "leak_rate": Variable(
+        _SERIES,
+        "m^3/s",
+        "leak rate",
+        "volume of fluid in unit time, by the pressure drop",
+        error="leak_rate_error",
+        table="value",
+        is_panel=True,
+    ),
     "leak_rate_error": Variable(_SERIES, "m^3/s", "stated error of the leak rate", _SOLVER),
-    "transmissivity": Variable(_SERIES, "m^3", "transmissivity", "hydraulic: of a parallel gap its cube over 12"),
-    "hydraulic_aperture": Variable(_SERIES, "m", "hydraulic aperture", "the parallel gap that leaks as much"),
-    "flux": Variable(_FRAME, "m^2/s", "flux", "volume flux over the height of the gap; missing in contact"),
+    "transmissivity": Variable(
+        _SERIES, "m^3", "transmissivity", "hydraulic: of a parallel gap its cube over 12", table="value"
+    ),
+    "hydraulic_aperture": Variable(
+        _SERIES, "m", "hydraulic aperture", "the parallel gap that leaks as much", table="value"
+    ),
+    "flux": Variable(_FRAME, "m^2/s", "flux", "volume flux over the height of the gap", missing="in contact"),
     "flux_x": Variable(_FRAME, "m^2/s", "flux along x", f"volume flux {_FLUX}"),
     "flux_y": Variable(_FRAME, "m^2/s", "flux along y", f"volume flux {_FLUX}"),
     # observables: contact spots
-    "thermal_conductance": Variable(_SERIES, "W/K", "thermal conductance", _SPOTS),
+    "thermal_conductance": Variable(
+        _SERIES,
+        "W/K",
+        "thermal conductance",
+        _SPOTS,
+        error="thermal_conductance_error",
+        table="value",
+        is_panel=True,
+    ),
     "thermal_conductance_error": Variable(_SERIES, "W/K", "stated error of the thermal conductance", _BOTH),
-    "electrical_conductance": Variable(_SERIES, "S", "electrical conductance", _SPOTS),
+    "electrical_conductance": Variable(
+        _SERIES,
+        "S",
+        "electrical conductance",
+        _SPOTS,
+        error="electrical_conductance_error",
+        table="value",
+        is_panel=True,
+    ),
     "electrical_conductance_error": Variable(_SERIES, "S", "stated error of the electrical conductance", _BOTH),
     # theories
-    "persson_contact_area": Variable(_SERIES, "m^2", "contact area, Persson", _ASPERITIES),
-    "asperity_contact_area": Variable(_SERIES, "m^2", "contact area, Bush et al.", f"at low loads, {_ASPERITIES}"),
+    "persson_contact_area": Variable(_SERIES, "m^2", "contact area, Persson", _ASPERITIES, missing=_FALLEN),
+    "asperity_contact_area": Variable(
+        _SERIES, "m^2", "contact area, Bush et al.", f"at low loads, {_ASPERITIES}", missing=_FALLEN
+    ),
     "persson_friction_coefficient": Variable(_SERIES, "1", "friction coefficient, Persson", _PERSSON),
     "persson_contact_fraction": Variable(_SERIES, "1", "contact fraction, Persson", _PERSSON),
 }
@@ -179,32 +377,14 @@ VARIABLES: dict[str, Variable] = {
 #: Fields that the user may request in ``fields``; the solver computes them.
 FIELDS = ("pressure", "gap", "displacement")
 #: Histories that are known at all accepted steps.
-STEPPED = tuple(name for name, one in VARIABLES.items() if one.dims == _STEPS and name != "time")
-#: Variables that a result over time has at its accepted steps alone, in the group ``steps``.
-_FORCES = ("nominal_pressure", "contact_area_counted", "friction_force_across")
-OF_STEPS = (*_FORCES, "time_error", "residual", "status", "convolutions", "wall_time")
+STEPPED = tuple(name for name, variable in VARIABLES.items() if variable.dims == _STEPS and name != "time")
 #: Conductances of the contact spots.
 CONDUCTANCES = ("thermal_conductance", "electrical_conductance")
-#: Quantity -> variable with its grid error.
-GRID_ERROR = {
-    "pressure": "grid_error",
-    "force": "grid_error",
-    "approach": "grid_error_approach",
-    "mean_gap": "grid_error_gap",
-    "contact_area": "grid_error_area",
-    "friction_force": "grid_error_friction",
-}
-#: Variables whose values in the last row are in the table of a sweep, and those whose largest values are.
-_CONTACT = ("force", "approach", "nominal_pressure", "contact_area", "contact_fraction", "mean_gap")
-_SLIDING = ("sliding_distance", "friction_coefficient", "friction_force", "friction_force_across")
-_FLOW = ("leak_rate", "transmissivity", "hydraulic_aperture")
-IN_TABLE = ("time", "speed", *_CONTACT, *_SLIDING, *_FLOW, *CONDUCTANCES)
-LARGEST_IN_TABLE = ("stated_error", *dict.fromkeys(GRID_ERROR.values()))
-#: Variable -> variables that may state its error. The variable `time_error` is about the time steps, not the time. The
-#: force is prescribed, or has an error below the error of the pressure, which `grid_error` states.
-ERRORS = {
-    name: tuple(one for one in (f"{name}_error", GRID_ERROR.get(name, "")) if one in VARIABLES) for name in VARIABLES
-} | {"time": (), "force": ()}
+
+
+def in_table(kind: Literal["value", "largest"]) -> dict[str, Variable]:
+    """Return the variables whose value in one row, or whose largest value, is in tables of cases."""
+    return {name: variable for name, variable in VARIABLES.items() if variable.table == kind}
 
 
 @dataclass(frozen=True)
@@ -241,10 +421,10 @@ class Axis:
         """
         return f"{self.symbol} = {unit_for([value], VARIABLES[self.name].units).text(value, digits)}"
 
-    def telling_row(self, histories: Mapping[str, Any]) -> int:
+    def telling_row(self, histories: Mapping[Any, Any]) -> int:
         """Return the number of the row that represents a result in a table."""
-        found = np.asarray(histories[self.telling]) if self.telling else np.zeros(0)
-        return int(np.nanargmax(found)) if np.isfinite(found).any() else -1
+        values = np.asarray(histories[self.telling]) if self.telling else np.zeros(0)
+        return int(np.nanargmax(values)) if np.isfinite(values).any() else -1
 
 
 #: Name of an axis -> the axis.
@@ -254,7 +434,7 @@ AXES: dict[str, Axis] = {
 }
 
 
-def axis_of(names: Container[str]) -> str:
+def axis_of(names: Container[Any]) -> str:
     """Return the axis of the rows of a result from the names of its variables.
 
     Examples

@@ -3,10 +3,12 @@
 The suite runs with the transforms of SciPy; mechanics/test_convolution.py compares those of ducc0 with them.
 """
 
+import importlib
 import os
 import shutil
 import signal
 import subprocess
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -23,6 +25,13 @@ from roughvisc.cli import main
 from roughvisc.mechanics.grid import Grid
 from roughvisc.plot import save as save_module
 from roughvisc.study.case import read_cases
+
+
+@pytest.fixture
+def docs_script(monkeypatch):
+    """Import a script of the documentation by its name."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[1] / "docs"))
+    return importlib.import_module
 
 
 @pytest.fixture

@@ -21,20 +21,28 @@ SMALL_ROUGH = rv.self_affine((1e-3, 0.8e-3), (22, 17), hurst=0.8, rms_slope=0.05
 #: The same with a hole.
 HOLED = SMALL_ROUGH.where((SMALL_ROUGH.x < 1.3e-4) | (SMALL_ROUGH.x > 2.8e-4) | (SMALL_ROUGH.y > 1.9e-4))
 
+#: A material of each model that a study may name, under this name, and further kinds.
 OF_EACH_KIND = {
     "elastic": rv.elastic(2e6, 0.3),
-    "series": rv.Prony(0.5, 0.1, (2.0, 1.0), (0.3, 20.0), poisson=0.3),
-    "bulk": rv.from_relaxation(1e6, [2e6], [0.1], bulk_modulus=2e9),
-    "power law": rv.power_law(0.2, 1.5, 0.3, time_scale=4.0, poisson=0.4),
-    "fractional": rv.fractional_zener(4.0, 1.0, 0.5, 0.4, poisson=0.3),
+    "maxwell": rv.maxwell(2e6, 1e6, 0.4),
+    "kelvin_voigt": rv.kelvin_voigt(1e6, 3e5),
+    "zener": RUBBER,
+    "prony": rv.Prony(0.5, 0.1, (2.0, 1.0), (0.3, 20.0), poisson=0.3),
+    "from_relaxation": rv.from_relaxation(1e6, [2e6], [0.1], bulk_modulus=2e9),
+    "power_law": rv.power_law(0.2, 1.5, 0.3, time_scale=4.0, poisson=0.4),
     "pure power law": rv.power_law(0.0, 1.0, 0.7),
-    "table": rv.creep_table((0.0, 0.5, 2.0, 30.0, 1e3), (0.1, 0.4, 0.9, 1.1, 7.0), poisson=0.2, kind="shear"),
+    "fractional_zener": rv.fractional_zener(4.0, 1.0, 0.5, 0.4, poisson=0.3),
+    "creep_table": rv.creep_table((0.0, 0.5, 2.0, 30.0, 1e3), (0.1, 0.4, 0.9, 1.1, 7.0), poisson=0.2, kind="shear"),
     "noisy table": rv.creep_table((0.5, 1.0, 30.0, 1e3), (1e-7, 2e-7, 1.99e-7, 8e-7), noise=0.1, kind="shear"),
+    "relaxation_table": rv.relaxation_table((0.01, 0.1, 1.0, 1e3), (3e6, 2e6, 1.5e6, 1.2e6), kind="shear"),
+    "dynamic_table": rv.dynamic_table(
+        (0.1, 1.0, 10.0, 100.0), (1e6, 1.5e6, 3e6, 3.5e6), (2e5, 5e5, 6e5, 3e5), frequency_unit="Hz", kind="shear"
+    ),
     "own": rv.creep(lambda t: 1.0 + np.log1p(t), poisson=0.1),
     "pair": rv.pair(rv.elastic(8e10, 0.3), RUBBER),
 }
-OF_EACH_KIND["mixed pair"] = rv.pair(OF_EACH_KIND["power law"], OF_EACH_KIND["table"])
-OF_EACH_KIND["shifted"] = rv.shift(OF_EACH_KIND["power law"], 20.0)
+OF_EACH_KIND["mixed pair"] = rv.pair(OF_EACH_KIND["power_law"], OF_EACH_KIND["creep_table"])
+OF_EACH_KIND["shifted"] = rv.shift(OF_EACH_KIND["power_law"], 20.0)
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from roughvisc.mechanics.memory import Memory
 from roughvisc.mechanics.stepping import Scene
 from roughvisc.runs.netcdf import open_result
 from roughvisc.study.case import read_study, vary
+from roughvisc.variables import VARIABLES
 
 #: The ball, the rubber and the press of BALL.
 RADIUS, LOAD, SIZE, TIMES = 10e-3, 5e-3, (1e-3, 1e-3), [0.0, 0.1, 0.2]
@@ -77,6 +78,13 @@ def numbers(folder):
 def at_rows(ds):
     """Histories of a result over time at its rows, with what only the steps have."""
     return rv.observables.history(ds).sel(time=ds.time)
+
+
+def assert_missing_as_declared(ds):
+    """A value is NaN only if its variable declares when it is missing; a bound or a conductance may be infinite."""
+    for name, values in ds.variables.items():
+        if values.dtype.kind == "f" and not VARIABLES[str(name)].missing:
+            assert not values.isnull().any(), name
 
 
 def with_steps(ds):

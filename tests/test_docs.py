@@ -1,6 +1,5 @@
 """The documentation: its Python runs, its studies are accepted, its commands and names exist."""
 
-import importlib
 import inspect
 import json
 import os
@@ -56,13 +55,6 @@ def blocks(path, language):
     """Blocks of a language that are to be tried; one is left out by a comment above it that says why."""
     found = _BLOCK.finditer(path.read_text(encoding="utf-8"))
     return [b["text"] for b in found if b["language"] == language and "not run:" not in b["before"]]
-
-
-@pytest.fixture
-def docs_script(monkeypatch):
-    """Import a script of the documentation by its name."""
-    monkeypatch.syspath_prepend(str(DOCS))
-    return importlib.import_module
 
 
 @pytest.fixture

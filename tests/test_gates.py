@@ -1,9 +1,10 @@
 """What a contributor touches: a new setting and a new variable two files, a material and a conditioning step one.
 
-The test adds one of each to a copy of the package, and uses it as a user would.
+The test adds one of each to a copy of the package, and uses it as a user would. The variable is that of the guide.
 """
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -17,14 +18,6 @@ ADDED = {
         "api.py": {
             "    edge: Edge = Settings.edge,\n": "    suction: float = 0.0,\n",
             '        "edge": edge,\n': '        "suction": suction,\n',
-        },
-    },
-    "variable": {
-        "variables.py": {
-            "VARIABLES: dict[str, Variable] = {\n": '    "stiffness": Variable(_SERIES, "N m-1", "secant stiffness"),\n'
-        },
-        "experiment/loading.py": {
-            '            "force": point.force,\n': '            "stiffness": point.force / point.approach,\n'
         },
     },
     "conditioning step": {
@@ -75,9 +68,9 @@ again = rv.Case.from_json(case.to_json())
 assert (again.material, again.settings) == (case.material, case.settings)
 np.testing.assert_allclose(case.height() - rv.vary(case, {"surface.raised": None}).height(), 1e-6, atol=1e-18)
 ds = rv.simulate(case.height(), case.body, case.program, suction=3.0, boundary="free", progress=False)
-np.testing.assert_allclose(ds.stiffness, ds.force / ds.approach, rtol=1e-14)
 stored = rv.run(case, out="out", progress=False)
-assert stored.stiffness.units == "N m-1" and stored.stiffness.dims == ("time",)
+assert stored.largest_pressure.units == "Pa" and stored.largest_pressure.dims == ("time",)
+assert "largest_pressure [Pa]" in rv.to_table("out")
 for key, wrong in {"solve.sucktion": 1.0, "material.modulus": "3 kg"}.items():
     try:
         rv.vary(case, {key: wrong})
@@ -88,15 +81,35 @@ for key, wrong in {"solve.sucktion": 1.0, "material.modulus": "3 kg"}.items():
 """
 
 
+def guide(part):
+    """Return the change of a part of the guide: file -> existing line, and what is inserted after it."""
+    text = (PACKAGE.parent / "docs" / "development.md").read_text(encoding="utf-8")
+    block = text.split(f"### {part}\n")[1].split("```diff\n")[1].split("```")[0]
+    changes = {}
+    for line in block.splitlines(keepends=True):
+        if line.startswith(" # ") and line.strip().endswith(".py"):
+            lines = changes.setdefault(line.removeprefix(" # ").strip(), {})
+            before = ""
+        elif line.startswith("+"):
+            lines[before] = lines.get(before, "") + line[1:]
+        else:
+            before = line[1:]
+    return changes
+
+
 def test_setting_variable_step_and_material__are_added_in_two_files_or_one(tmp_path):
-    assert {what: len(edits) for what, edits in ADDED.items()} == {
+    changes = guide("A variable")
+    ((_, test),) = changes.pop("tests/experiment/test_rows.py").items()
+    variable = {file.removeprefix("roughvisc/"): lines for file, lines in changes.items()}
+    added = ADDED | {"variable": variable}
+    assert {what: len(edits) for what, edits in added.items()} == {
         "setting": 2,
-        "variable": 2,
         "conditioning step": 1,
         "material": 1,
+        "variable": 2,
     }
     shutil.copytree(PACKAGE, tmp_path / "roughvisc", ignore=shutil.ignore_patterns("__pycache__"))
-    for file, changes in (one for edits in ADDED.values() for one in edits.items()):
+    for file, changes in (edit for edits in added.values() for edit in edits.items()):
         path = tmp_path / "roughvisc" / file
         text = path.read_text(encoding="utf-8")
         for line, more in changes.items():
@@ -104,6 +117,7 @@ def test_setting_variable_step_and_material__are_added_in_two_files_or_one(tmp_p
             text = text.replace(line, line + more)
         path.write_text(text, encoding="utf-8")
     (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
-    command = [sys.executable, "-W", "error", "-c", USE]
+    code = "\n".join([USE, "import pytest", test, *re.findall(r"def (test_\w+)\(", test)]) + "()\n"
+    command = [sys.executable, "-W", "error", "-c", code]
     done = subprocess.run(command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(tmp_path)}, capture_output=True)
     assert done.returncode == 0, done.stderr.decode()

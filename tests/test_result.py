@@ -6,9 +6,10 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
-from support import STUDY, refused
+from support import STUDY, assert_missing_as_declared, refused
 
 import roughvisc as rv
+from roughvisc.variables import VARIABLES
 
 BALL, RUBBER = rv.sphere(1e-2, 2e-3, (17, 15)), rv.zener(1e6, 1e6, 1e6)
 PROGRAM = rv.Program().load(0.01, over=0.5).hold(2.0)
@@ -38,26 +39,45 @@ def concatenated(results, dim, **how):
         return xr.concat(results, dim, **how)
 
 
-def test_result__has_few_variables_and_attributes(stored, tmp_path):
+@pytest.fixture(scope="module")
+def results(stored):
+    """Results of each experiment, with all errors and, if the surface parts, without values."""
     rough = rv.self_affine((1e-3, 0.9e-3), (24, 21), hurst=0.8, rms_slope=0.1, rolloff=5e-4, seed=1)
-    material = rv.sheet(RUBBER, 1e-3)
+    body = rv.sheet(RUBBER, 1e-3)
     press = rv.Program().pressure(1e4, over=0.1)
-    shared = {"grid_error": True, "progress": False}
-    curve = rv.friction(rough, material, speeds=[1e-3, 1e-2], load=0.02, fields=("pressure", "gap"), **shared)
-    scan = rv.simulate(rough, material, press, boundary="periodic", times=2, **shared)
-    sheet = STUDY.replace("[[program]]", 'thickness = "0.1 mm"\n[[program]]', 1)
-    (tmp_path / "sheet.toml").write_text(sheet + "[solve]\ntime_step = 0.1\n")
-    fullest = rv.run(tmp_path / "sheet.toml", progress=False)
-    assert {"thickness", "warnings"} <= set(fullest.attrs)
-    for ds in (stored, fullest, curve, scan):
-        assert len(ds.variables) <= 26
-        assert len(ds.attrs) <= 17
+    how = {"grid_error": True, "progress": False}
+    every = how | {"boundary": "periodic", "times": 4, "fields": ("pressure", "gap", "displacement")}
+    return {
+        "stored": stored,
+        "curve": rv.friction(rough, body, speeds=[1e-3, 1e-2], load=0.02, fields=("pressure", "gap"), **how),
+        "slide": rv.simulate(rough, body, press.slide(1e-4, over=0.1).load(0.0, over=0).hold(0.1), **every),
+        "rest": rv.simulate(rough, body, press, **every),
+    }
+
+
+def test_result__has_plain_attributes_and_values_that_exist_unless_it_is_declared(results):
+    for ds in results.values():
         assert all(isinstance(value, str | int | float | np.number) for value in ds.attrs.values())
-    assert stored.stated_error.attrs["long_name"] == "numerical error"
-    every = {**shared, "boundary": "periodic", "times": 2, "fields": ("pressure", "gap", "displacement")}
-    load, slide = (rv.simulate(rough, material, one, **every) for one in (press, press.slide(1e-4, over=0.1)))
-    for ds in (load, slide):
-        assert len(ds.variables) <= 26
+        assert_missing_as_declared(ds)
+    parted = results["slide"].isel(time=-1)
+    assert parted.force == 0
+    assert {"mean_contact_pressure", "friction_coefficient"} < {name for name in parted if parted[name].isnull().any()}
+    assert results["stored"].stated_error.attrs["long_name"] == "numerical error"
+
+
+def test_variables__name_their_errors_which_every_result_has(results):
+    named = {variable.error for variable in VARIABLES.values()} | {one.grid_error for one in VARIABLES.values()}
+    assert {name for name in VARIABLES if "grid_error" in name or name.endswith("_error")} - named == {
+        "stated_error",  # of several quantities
+        "time_error",  # of the time steps
+    }
+    for variable in VARIABLES.values():
+        assert not variable.error or VARIABLES[variable.error].units == variable.units
+        assert not variable.grid_error or VARIABLES[variable.grid_error].units == "1"
+    for kind, ds in results.items():
+        for name in {"force", "contact_area", "mean_contact_pressure", "friction_coefficient"} & set(ds.variables):
+            assert VARIABLES[name].error in ds.variables, (kind, name)
+            assert ds[name].attrs["ancillary_variables"].split()[0] == VARIABLES[name].error
 
 
 def test_attributes__state_program_body_material_and_version(ball, stored):

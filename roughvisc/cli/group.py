@@ -47,7 +47,7 @@ class Failure(click.ClickException):
 
     def __init__(self, message: str, status: int) -> None:
         super().__init__(message)
-        self.exit_code = status
+        vars(self)["exit_code"] = status  # click declares it for the class
 
     def show(self, file: Any = None) -> None:
         complain(self.message)
@@ -114,7 +114,8 @@ def _terminate(number: int, _: Any) -> None:
 def _settings_of_process() -> Iterator[None]:
     """Show warnings as messages and treat SIGTERM as an interrupt."""
     usual = logging.lastResort, warnings.showwarning, signal.signal(signal.SIGTERM, _terminate)
-    logging.lastResort, warnings.showwarning = _Screen(), lambda warning, *_: complain(f"warning: {warning}")
+    logging.lastResort = _Screen()
+    warnings.showwarning = lambda warning, *_: complain(f"warning: {warning}")
     try:
         yield
     finally:

@@ -12,16 +12,27 @@ from roughvisc.cli.group import PATH, Failure, complain, counted, quantity, say_
 from roughvisc.errors import printable
 
 
+class _AllFigures(click.Option):
+    """Option that lists the figures it adds, when its help is shown."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        from roughvisc.plot.save import DEFAULT, FIGURES  # slow to import
+
+        others = ", ".join(name for name in FIGURES if name not in DEFAULT)
+        self.help = f"Also draw {others}, and of a folder the figures of each case."
+        return super().get_help_record(ctx)
+
+
 @click.command()
 @click.argument("result", type=PATH)
 @click.option("--out", type=PATH, help="Folder for the figures. [default: folder of the result]")
-@click.option("--all", "every", is_flag=True, help="Draw every figure that the results allow.")
+@click.option("--all", "every", is_flag=True, cls=_AllFigures)
 def plot(result: Path, out: Path | None, every: bool) -> None:
     """Draw figures of a result or a folder of results.
 
     Draws two figures of a result: history and maps, or friction curve and maps. Of a folder with several cases, draws
-    the figures of the sweep: quantities against the varied settings, and the histories of all cases. --all also draws
-    section and surface, and the figures of each case. File names state the varied settings.
+    the figures of the sweep: quantities against the varied settings, and the histories of all cases. File names state
+    the varied settings.
 
     \b
     Example:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -81,7 +82,7 @@ def _by_options(message: str, options: Iterable[str]) -> str:
     names = "|".join(options)
     return re.sub(
         rf'\b({names}) = (?:"([^"]+)"|([^",\s]+))',
-        lambda stated: f"--{stated[1].replace('_', '-')} {shell_word(stated[2] or stated[3])}",
+        lambda stated: f"--{stated[1].replace('_', '-')} {shlex.quote(stated[2] or stated[3])}",
         message,
     )
 

@@ -49,17 +49,21 @@ def budget_table(dataset: xr.Dataset) -> Group:
     dataset : xarray.Dataset
         Result of :func:`roughvisc.budget`, for one quantity.
     """
-    axis, name = AXES[axis_of(dataset.variables)], str(dataset["quantity"].values)
-    unit, unknown = unit_for(dataset["value"].values, VARIABLES[name].units), dataset.attrs["open"].split("; ")
+    axis = AXES[axis_of(dataset.variables)]
+    name = str(dataset["quantity"].values)
+    unit = unit_for(dataset["value"].values, VARIABLES[name].units)
+    unknown = dataset.attrs["open"].split("; ")
     rows = []
     for source in dataset["source"].values:
-        one = dataset.sel(source=source)
-        rows.append((source, "open" if source in unknown else _error(one), _by_option(str(one["method"].values))))
+        of_source = dataset.sel(source=source)
+        rows.append(
+            (source, "open" if source in unknown else _error(of_source), _by_option(str(of_source["method"].values)))
+        )
     lines = []
     for place in dataset[axis.name].values:
-        at = dataset.sel({axis.name: place})
-        low, value, high = (unit.text(float(at[end])) for end in ("lower", "value", "upper"))
-        interval = f"at 95 % from {low} to {high}" if np.isfinite(at["upper"]) else "without an interval"
+        row = dataset.sel({axis.name: place})
+        low, value, high = (unit.text(float(row[end])) for end in ("lower", "value", "upper"))
+        interval = f"at 95 % from {low} to {high}" if np.isfinite(row["upper"]) else "without an interval"
         lines.append(f"{axis.place(float(place), 3)}: {value}, {interval}")
     note = f"Errors are the smallest and the largest of all {axis.rows}."
     note += " The interval does not include open sources." if dataset.attrs["open"] else ""
@@ -100,16 +104,19 @@ def trade_table(dataset: xr.Dataset, quantity: str, target: float) -> Group:
         Target relative error. [-]
     """
     shown = dataset["quantity"].values[:_COLUMNS].tolist()
-    best, chosen = pareto_front(dataset, quantity), cheapest(dataset, quantity, target)
+    best = pareto_front(dataset, quantity)
+    chosen = cheapest(dataset, quantity, target)
     rows = []
     for i in range(dataset.sizes["setting"]):
         row = dataset.isel(setting=i)
-        mark, name = (">" if i == chosen else "") + ("*" if best[i] else ""), str(row["setting"].values)
+        mark = (">" if i == chosen else "") + ("*" if best[i] else "")
+        name = str(row["setting"].values)
         errors = [_percent(float(row["error"].sel(quantity=one))) for one in shown]
         cost = f"{float(row['run_time']):.2g} s", f"{float(row['transforms']):.0f}"
         rows.append((mark, name.replace(", ", ",\n"), *cost, *errors))
     headings = ("", "setting", "time", "FFTs", *(name.replace("_", "\n") for name in shown))
-    words, wanted = VARIABLES[quantity].label.lower(), f"{_percent(target)} %"
+    words = VARIABLES[quantity].label.lower()
+    wanted = f"{_percent(target)} %"
     by_steps, by_grid = (
         _percent(float(dataset[f"reference_{part}_uncertainty"].sel(quantity=quantity))) for part in ("time", "grid")
     )
@@ -143,7 +150,8 @@ def plan_tables(costs: xr.Dataset) -> Group:
     costs : xarray.Dataset
         Result of :func:`roughvisc.plan`.
     """
-    total, attrs = costs.sizes["case"], costs.attrs
+    total = costs.sizes["case"]
+    attrs = costs.attrs
     threads = f"{counted(attrs['threads'], 'thread')} on large grids"
     grids = [f"{x} x {y} cells" for x, y in zip(costs.cells_x.values, costs.cells_y.values, strict=True)]
     rows = [
@@ -169,8 +177,8 @@ def plan_tables(costs: xr.Dataset) -> Group:
 
 def _distinct(texts: Any) -> str:
     """Return the first three distinct texts, and the number of further texts."""
-    found = list(filter(None, dict.fromkeys(str(text).rstrip(".") for text in texts)))
-    return "; ".join(found[:3]) + (f"; and {len(found) - 3} more" if len(found) > 3 else "")
+    distinct = list(filter(None, dict.fromkeys(str(text).rstrip(".") for text in texts)))
+    return "; ".join(distinct[:3]) + (f"; and {len(distinct) - 3} more" if len(distinct) > 3 else "")
 
 
 def _case_table(costs: xr.Dataset) -> Any:

@@ -17,7 +17,7 @@ from roughvisc.errors import printable
 from roughvisc.labels import cost_of, grid_error_of
 from roughvisc.topography.grid import spacing
 from roughvisc.units import unit_for
-from roughvisc.variables import AXES, ERRORS, IN_TABLE, VARIABLES, axis_of
+from roughvisc.variables import AXES, VARIABLES, axis_of, in_table
 
 if TYPE_CHECKING:
     from roughvisc.runs.run import Outcome
@@ -70,17 +70,17 @@ def errors_in_words(row: xr.Dataset, name: str) -> str:
         Name of the quantity.
     """
     name = "contact_area" if name == "contact_fraction" else name  # which have equal relative errors
+    variable = VARIABLES[name]
     value = abs(float(row[name]))
     parts = []
-    for error in filter(row.__contains__, ERRORS[name]):
-        size = float(row[error])
-        if error != f"{name}_error":
-            parts.append(f"grid {percent(size)}")
-        else:
-            text = percent(size / value) if value > 0 else readable(size, VARIABLES[error].units)
-            parts.append(f"numerical {text}")
-    parts = [text for text in parts if "nan" not in text and "not known" not in text]
-    return f" ({', '.join(parts)})" if parts else ""
+    if variable.error in row and float(row[variable.error]) != 0:  # zero if prescribed
+        size = float(row[variable.error])
+        parts.append(("numerical", percent(size / value) if value > 0 else readable(size, variable.units), size))
+    if variable.grid_error in row:
+        size = float(row[variable.grid_error])
+        parts.append(("grid", percent(size), size))
+    known = ", ".join(f"{kind} {text}" for kind, text, size in parts if math.isfinite(size))
+    return f" ({known})" if known else ""
 
 
 def percent(part: float) -> str:
@@ -104,13 +104,14 @@ def result_table(dataset: xr.Dataset) -> Group:
         ("Grid", f"{dataset.sizes['x']} x {dataset.sizes['y']} cells, {dataset.attrs.get('boundary', '?')} boundary"),
         (axis.rows.capitalize(), f"{dataset.sizes[axis.name]}, to {axis.place(float(dataset[axis.name].max()), 3)}"),
     ]
-    for name in IN_TABLE:
+    for name, variable in in_table("value").items():
         if name in row and name != axis.name:
-            text = readable(float(row[name]), VARIABLES[name].units) + errors_in_words(row, name)
-            rows.append((f"{VARIABLES[name].label} {where}", text))
+            text = readable(float(row[name]), variable.units) + errors_in_words(row, name)
+            rows.append((f"{variable.label} {where}", text))
         if name == "contact_area" and name in row and not axis.telling:
             most = dataset.isel({axis.name: int(np.argmax(dataset[name].values))})
-            text, place = readable(float(most[name]), "m^2"), axis.place(float(most[axis.name]), 3)
+            text = readable(float(most[name]), "m^2")
+            place = axis.place(float(most[axis.name]), 3)
             if text != readable(float(row[name]), "m^2"):
                 rows.append((f"Largest {VARIABLES[name].label.lower()}", f"{text} at {place}"))
     seconds, convolutions = cost_of(dataset)
@@ -160,7 +161,9 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Group:
     name : str
         Name of the file.
     """
-    counts, sides, missing = height.shape, spacing(height), int(height.isnull().sum())
+    counts = height.shape
+    sides = spacing(height)
+    missing = int(height.isnull().sum())
     stated = ("format", "instrument", "channel", "other_channels", "orientation")
     rows = [(key.capitalize().replace("_", " "), height.attrs.get(key, "")) for key in stated]
     rows += [

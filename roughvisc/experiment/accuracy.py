@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from roughvisc.experiment.kept_times import kept_times
 from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.solver import PERIMETER_CORRECTION
+from roughvisc.mechanics.grid import namespace
 from roughvisc.mechanics.memory import SERIES_SHARE, Memory, choose_memory
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.scene import Scene
@@ -24,6 +26,7 @@ from roughvisc.topography.borders import JUMP, border_mismatch
 from roughvisc.topography.grid import squared_slopes
 from roughvisc.topography.recipes import indenter_of, is_analytic
 from roughvisc.units import format_quantity
+from roughvisc.variables import VARIABLES
 
 Array = NDArray[np.float64]
 #: Errors inherited from the contact solver in earlier steps, over its largest error so far: of the pressure, and of the
@@ -105,8 +108,8 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
     Returns
     -------
     dict
-        ``time_error`` of the time steps alone [-], ``stated_error`` [-], ``residual`` [-], ``approach_error`` [m],
-        ``work_error`` [J].
+        ``time_error`` of the time steps alone [-], ``stated_error`` [-], ``residual`` [-], ``force_error`` [N],
+        ``approach_error`` [m], ``work_error`` [J].
 
     Notes
     -----
@@ -145,44 +148,111 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
         "time_error": max(stepped / per_force, apart.force / per_force, apart.approach / per_approach),
         "stated_error": max(pressure, force / per_force, approach / per_approach),
         "residual": point.solver_error,
+        "force_error": force,
         "approach_error": approach,
         "work_error": work,
     }
 
 
-def area_error(step: Step, scene: Scene, length: float, pressure: Any, gap: Any, counted: float, area: float) -> float:
-    """Return the error of the contact area due to time steps and contact solver. [m2]
-
-    The solver may misjudge a contact cell if its pressure is below the error of the pressure at the edge. It may
-    misjudge an open cell if this pressure would close the gap of the cell.
+def uncertain_area(
+    pressure: Any, gap: Any, off: float, closed: float, cell_area: float, present: Any = None
+) -> tuple[float, float]:
+    """Return the area in contact and the area out of contact that the contact solver may misjudge. [m2]
 
     Parameters
     ----------
-    step, scene : Step, Scene
-        An accepted step.
-    length : float
-        Length of the step; zero for a jump. [s]
     pressure, gap : array, shape (nx, ny)
         Pressure [Pa] and gap between the surfaces. [m]
+    off : float
+        Error of the pressure at the edge of contact. A contact cell of lower pressure may be open. [Pa]
+    closed : float
+        Displacement of a cell under this pressure. An open cell of smaller gap may be in contact. [m]
+    cell_area : float
+        Area of a cell. [m2]
+    present : array of bool, shape (nx, ny), or None
+        Cells with material; None: all.
+    """
+    count = namespace(pressure).count_nonzero
+    closing = (pressure == 0) & (gap <= closed)
+    if present is not None:
+        closing &= present
+    opening = (pressure > 0) & (pressure <= off)
+    return cell_area * int(count(opening)), cell_area * int(count(closing))
+
+
+def area_error(counted: float, area: float, inside: float, outside: float) -> float:
+    """Return the error of the contact area due to uncertain cells. [m2]
+
+    A cell that enters or leaves the contact changes the count by one cell and the staircase by at most its four faces.
+    Its area exceeds the correction for its faces: the area grows with each cell, and never exceeds the count.
+
+    Parameters
+    ----------
     counted, area : float
         Contact area, counted and corrected for the grid. [m2]
+    inside, outside : float
+        Uncertain area in contact and out of contact. [m2]
     """
-    point, apart, xp = step.point, step.difference, scene.grid.xp
-    inside, outside = apart.inside, apart.outside
-    if counted > 0 and point.solver_error > 0:
-        off = SOLVER_AT_EDGE * point.solver_error * point.force / counted
-        closed = off * scene.grid.self_influence * scene.memory.compliance(length)
-        closing = (pressure == 0) & (gap <= closed)
-        if scene.present is not None:
-            closing &= scene.present
-        opening = (pressure > 0) & (pressure <= off)
-        inside += scene.grid.cell_area * int(xp.count_nonzero(opening))
-        outside += scene.grid.cell_area * int(xp.count_nonzero(closing))
-    # A cell that enters or leaves the contact changes the count by one cell and the staircase by at most its four
-    # faces. Its area exceeds the correction for its faces: the area grows with each cell, and never exceeds the count.
     most = 1 + 4 * PERIMETER_CORRECTION
-    lower, upper = max(area - most * inside, 0.0), min(area + most * outside, counted + outside)
+    lower = max(area - most * inside, 0.0)
+    upper = min(area + most * outside, counted + outside)
     return float(max(area - lower, upper - area))
+
+
+# -------------------------------------------------------------------------------------------------- derived quantities
+
+
+@dataclass(frozen=True)
+class Stated:
+    """Value with its stated error, both in one unit.
+
+    Attributes
+    ----------
+    value : float
+        The value; NaN if it does not exist.
+    error : float
+        Its stated error; NaN if it is not known.
+    """
+
+    value: float
+    error: float = math.nan
+
+    def over(self, divisor: Stated) -> Stated:
+        """Return the ratio of two positive values; NaN if the divisor is zero, and without an error if it may be zero.
+
+        The error is the distance to the largest ratio within both errors. The smallest ratio is nearer.
+
+        Examples
+        --------
+        >>> Stated(6.0, 1.0).over(Stated(3.0, 1.0))
+        Stated(value=2.0, error=1.5)
+        """
+        if not divisor.value > 0:
+            return Stated(math.nan)
+        ratio = self.value / divisor.value
+        least = divisor.value - divisor.error
+        return Stated(ratio, (self.error + abs(ratio) * divisor.error) / least if least > 0 else math.nan)
+
+
+def columns_of(force: Stated, area: Stated, nominal: float, friction: Stated | None = None) -> dict[str, float]:
+    """Return force, contact area and friction force of a row, and the quantities that follow, with their stated errors.
+
+    Parameters
+    ----------
+    force, area : Stated
+        Normal force [N] and contact area. [m2]
+    nominal : float
+        Area of all cells. [m2]
+    friction : Stated, optional
+        Friction force. [N]
+    """
+    quantities = {"force": force, "contact_area": area, "mean_contact_pressure": force.over(area)}
+    if friction is not None:
+        quantities |= {"friction_force": friction, "friction_coefficient": friction.over(force)}
+    columns = {"contact_fraction": area.value / nominal}
+    for name, quantity in quantities.items():
+        columns |= {name: quantity.value, VARIABLES[name].error: quantity.error}
+    return columns
 
 
 # ---------------------------------------------------------------------------------------------------------- warnings

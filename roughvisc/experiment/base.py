@@ -151,7 +151,7 @@ class Experiment(ABC):
         """
         height = checked(problem.height, "height", least=1)
         settings = problem.settings
-        boundary = settings.boundary
+        boundary: Any = settings.boundary
         if boundary == "auto":
             boundary = self.boundary or ("free" if settings.edge == "accept" else boundary_of(height))
         if boundary is None:

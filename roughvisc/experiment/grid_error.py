@@ -21,15 +21,19 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.errors import RoughviscError
+from roughvisc.experiment.accuracy import Stated
 from roughvisc.mechanics.contact.solver import neighbours
 from roughvisc.mechanics.grid import Boundary
 from roughvisc.topography.grid import cell_edges
 from roughvisc.topography.recipes import indenter_of, remade
 from roughvisc.topography.spectrum import resample, shares
-from roughvisc.variables import GRID_ERROR
+from roughvisc.variables import VARIABLES
 
 log = logging.getLogger("roughvisc")
 Array = NDArray[np.float64]
+#: Histories that runs on different grids are compared by; ``grid_error`` includes the error of the force.
+COMPARED = ("force", "approach", "mean_gap", "contact_area", "friction_force")
+_COLUMN = {name: VARIABLES[name].grid_error for name in ("pressure", *COMPARED)} | {"force": "grid_error"}
 #: Orders of convergence in the cell side: lowest accepted order and expected order. They are measured; for the pressure
 #: in the L1 norm. The mean gap converges like the displacements, but more slowly in free space. The counted area
 #: converges like the number of cells at its edge. The contact area keeps the scatter of the count. Friction shows order
@@ -129,7 +133,7 @@ def with_grid_error(
     for a quantity that is zero in all rows but may differ from zero: zero has no relative error. The coarser grid has
     all waves that it can resolve, see :func:`coarser`.
     """
-    histories = [name for name in GRID_ERROR if name in dataset and name != "pressure"]
+    histories = [name for name in COMPARED if name in dataset]
     times = dataset["time"].values.tolist()
     try:
         few = coarser(height, 2.0, dataset.attrs["boundary"])
@@ -139,23 +143,35 @@ def with_grid_error(
     except RoughviscError as error:
         log.warning("no grid error: the coarser solve failed: %s", error)
         missing = "time", np.full(len(times), math.nan)
-        return dataset.assign({GRID_ERROR[name]: missing for name in ("pressure", *histories)})
+        columns = [VARIABLES["mean_contact_pressure"].grid_error, *map(_COLUMN.__getitem__, ("pressure", *histories))]
+        return dataset.assign(dict.fromkeys(columns, missing))
     largest = {name: float(np.fmax.reduce(np.abs(dataset[name].values), initial=_ZERO)) for name in histories}
     off = {name: np.abs(coarse[name].values - dataset[name].values) for name in histories}
     apart = {"pressure": pressure_distance(coarse, dataset) / largest["force"]}
     apart |= {name: off[name] / largest[name] for name in histories}
-    ratio, found = math.sqrt(height.size / few.size), {}
+    ratio = math.sqrt(height.size / few.size)
+    differences = {}
     for name, difference in apart.items():
         safety, order = _ONE_COARSER.get(name, _ONE_COARSER_USUAL)
-        found[name] = safety * difference / (ratio**order - 1)
+        differences[name] = safety * difference / (ratio**order - 1)
     is_given = off["approach"] < _GIVEN * largest["approach"]
     periodic = dataset.attrs["boundary"] == "periodic"
     peak = 0.0 if indenter_of(height) is not None else hidden_peak(height.values, periodic)
     rows = [_least_errors(dataset, row, largest, bool(is_given[row]), peak) for row in range(len(times))]
-    errors = grid_errors(found, {name: np.array([row[name] for row in rows]) for name in rows[0]})
+    of_quantity = at_least(differences, {name: np.array([row[name] for row in rows]) for name in rows[0]})
+    errors = by_column(of_quantity)
     for name in histories:
-        errors[GRID_ERROR[name]] = missing_of_zero(errors[GRID_ERROR[name]], largest[name])
+        errors[_COLUMN[name]] = missing_of_zero(errors[_COLUMN[name]], largest[name])
     errors["grid_error"] = np.maximum(errors["grid_error"], errors["grid_error_approach"])
+    pressures = []
+    for row in range(len(times)):
+        force, area = (
+            Stated(float(dataset[name][row]), float(of_quantity[name][row]) * largest[name])
+            for name in ("force", "contact_area")
+        )
+        pressures.append(force.over(area))
+    most = np.fmax.reduce([one.value for one in pressures], initial=_ZERO)
+    errors[VARIABLES["mean_contact_pressure"].grid_error] = np.array([one.error / most for one in pressures])
     return dataset.assign({name: ("time", values) for name, values in errors.items()})
 
 
@@ -168,21 +184,26 @@ def missing_of_zero(error: ArrayLike, size: float) -> Array:
     return error if size > _ZERO else np.where(error > 0, math.nan, error)
 
 
-def grid_errors(found: Mapping[str, Array], least: Mapping[str, Array]) -> dict[str, Array]:
-    """Return the errors due to the grid by result variable, each the largest error of its quantities.
+def at_least(differences: Mapping[str, ArrayLike], least: Mapping[str, ArrayLike]) -> dict[str, Array]:
+    """Return the error of each quantity due to the grid.
 
     Parameters
     ----------
-    found : mapping
+    differences : mapping
         Quantity -> error from the difference between the grids; NaN if the coarser run failed.
     least : mapping
         Quantity -> least error to state, from the finest grid alone.
     """
-    errors: dict[str, Array] = {}
-    for name, error in found.items():
-        larger, variable = np.maximum(error, least.get(name, 0.0)), GRID_ERROR[name]
-        errors[variable] = np.maximum(errors.get(variable, larger), larger)
-    return errors
+    return {name: np.asarray(np.maximum(error, least.get(name, 0.0))) for name, error in differences.items()}
+
+
+def by_column(errors: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the errors of quantities due to the grid by result variable, each the largest error of its quantities."""
+    columns: dict[str, Array] = {}
+    for name, error in errors.items():
+        column = _COLUMN[name]
+        columns[column] = np.maximum(columns.get(column, error), error)
+    return columns
 
 
 def hidden_peak(height: Array, periodic: bool) -> float:

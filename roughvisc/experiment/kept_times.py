@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +18,13 @@ _ROUNDING = 64
 #: Latest first kept time of a hold, as a part of the hold. [-]
 _FIRST = 1e-3
 #: Relative numbers of kept times of a ramp or a slide, a hold, and a period of a cycle.
-_RAMP, _HOLD, _PERIOD = 2.0, 3.0, 16.0
+_RAMP = 2.0
+_HOLD = 3.0
+_PERIOD = 16.0
 
 
 def kept_times(
-    program: Program, times: int | Sequence[float] | None, *spacings: tuple[float, float]
+    program: Program, times: int | Sequence[Any] | None, *spacings: tuple[float, float]
 ) -> tuple[float, ...] | None:
     """Return the times to keep, ascending. [s]
 
@@ -44,7 +47,8 @@ def kept_times(
     """
     if times is None:
         return None
-    corners, duration = np.array(program.corners), program.duration
+    corners = np.array(program.corners)
+    duration = program.duration
     kept: list[float] = []
     for value in spread_times(program, times) if isinstance(times, int) else np.unique(np.asarray(times, dtype=float)):
         nearest = float(corners[np.argmin(np.abs(corners - value))])
@@ -55,14 +59,14 @@ def kept_times(
             kept.append(snapped)
     if not (spacings and program.slides):
         return tuple(kept)
-    found = np.array(kept)
+    instants = np.array(kept)
     for segment, began, end in zip(program.segments, program.corners, program.corners[1:], strict=False):
         if segment.slide is not None:
             cells = math.gcd(*map(segment.slide.cells, spacings))
-            for place in np.flatnonzero((found > began) & (found < end)):
-                taken = round((found[place] - began) / (end - began) * cells)
-                found[place] = instant(began, end, taken, cells)
-    return tuple(np.unique(found).tolist())
+            for place in np.flatnonzero((instants > began) & (instants < end)):
+                taken = round((instants[place] - began) / (end - began) * cells)
+                instants[place] = instant(began, end, taken, cells)
+    return tuple(np.unique(instants).tolist())
 
 
 def spread_times(program: Program, count: int) -> Array:
@@ -103,12 +107,13 @@ def spread_times(program: Program, count: int) -> Array:
     largest_remainders = np.argsort(numbers - exact, kind="stable")[: further - int(numbers.sum())]
     numbers[largest_remainders] += 1
 
-    found, before = [corners], math.inf
+    places = [corners]
+    before = math.inf
     for began, segment, many in zip(program.corners, program.segments, numbers, strict=False):
         if segment.duration > 0:
             parts = np.arange(1, many + 1) / (many + 1)
             if segment.holds and many:
                 parts = min(_FIRST, before / (3 * segment.duration)) ** (1 - parts)
-            found.append(began + parts * segment.duration)
+            places.append(began + parts * segment.duration)
             before = segment.duration
-    return np.unique(np.concatenate(found))
+    return np.unique(np.concatenate(places))

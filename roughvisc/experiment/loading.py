@@ -15,12 +15,16 @@ from numpy.typing import NDArray
 
 from roughvisc.errors import EdgeContactError, InputError
 from roughvisc.experiment.accuracy import (
+    SOLVER_AT_EDGE,
+    Stated,
     area_error,
     border_warning,
+    columns_of,
     error_columns,
     loaded_depth,
     memory_of,
     slope_warning,
+    uncertain_area,
     wakes_of,
 )
 from roughvisc.experiment.base import Experiment, Outgrown, Row, Rows
@@ -124,6 +128,7 @@ class Loading(Experiment):
         before = (None, 0) if state is None else (state.enlarged, state.outgrown)
         profile, domain, enlarged, reaches_border = choose_surface(given, problem, program, *before)
         gap = np.ascontiguousarray(profile.gap[domain.cells])
+        assert settings.boundary != "auto", "resolved() replaces it"
         grid = Grid((gap.shape[0], gap.shape[1]), profile.spacing, settings.boundary, kernel=profile.kernel, xp=xp)
         memory = memory_of(body, program, settings, grid=grid, keeps_pressure=not domain.is_whole)
         log.info("memory: %s", memory.note)
@@ -134,7 +139,7 @@ class Loading(Experiment):
             program=program,
             kept=kept_times(program, settings.times, profile.spacing),
             tolerance=settings.tolerance,
-            time_step=None if settings.time_step == "auto" else settings.time_step,
+            time_step=None if isinstance(settings.time_step, str) else settings.time_step,
             present=None if profile.all_present else xp.asarray(profile.present[domain.cells]),
         )
         return LoadingRows(
@@ -153,7 +158,7 @@ class Loading(Experiment):
         if self.program.slides and settings.boundary != "periodic":
             yield "boundary", settings.boundary, "'periodic' for a program that slides (rv.mirror unfolds a surface)"
         end = self.program.duration
-        if settings.time_step != "auto" and settings.time_step < 4 * math.ulp(end):
+        if not isinstance(settings.time_step, str) and settings.time_step < 4 * math.ulp(end):
             resolution = f"at the end of the program, {end:g} s, times have a resolution of {math.ulp(end):.2g} s"
             yield "time_step", settings.time_step, f"a longer step: {resolution}"
 
@@ -229,7 +234,8 @@ class LoadingRows(Rows):
                 is_given = scene.time_step is not None or scene.program.segments[step.segment].slide is not None
                 kept = point.time in ends or is_given or stated["stated_error"] <= CHOSEN * scene.tolerance
             largest = so_far if kept else largest
-            values, fields = {}, {}
+            values: dict[str, Any] = {}
+            fields: dict[str, Array] = {}
             if step.is_end:
                 self.state = replace(self.state, march=step.state, largest=largest)
             # If hardly any compliance is instantaneous, the pressure of a step that is not kept belongs to the step and
@@ -291,31 +297,27 @@ class LoadingRows(Rows):
         else:
             effective = to_host(displaced[-1])
             mean_gap = profile.mean_gap + float((effective * domain.mean_influence).sum()) - point.approach
-        row: dict[str, Any] = stated | {
-            "force": point.force,
+        slide = scene.motions[step.segment]
+        friction = None
+        if slide is not None:
+            friction = Stated(tangential_force(grid, pressure, displaced[0], slide), step.difference.friction)
+        off_area = self._area_error(step, length, gap, counted, area) if kept else math.nan
+        force = Stated(point.force, stated["force_error"])
+        row: dict[str, Any] = stated | columns_of(force, Stated(area, off_area), profile.area, friction)
+        row |= {
             "approach": point.approach,
             "nominal_pressure": point.force / self.area,
             "work": step.state.work,
             "convolutions": step.state.convolutions,
             "status": STATUS_MEANINGS.index(status),
-            "contact_area": area,
             "contact_area_counted": counted,
-            "contact_fraction": area / profile.area,
             "mean_gap": mean_gap,
         }
-        slide = scene.motions[step.segment]
         if slide is not None:
-            friction = tangential_force(grid, pressure, displaced[0], slide)
-            row |= {
-                "sliding_distance": step.state.distance,
-                "friction_force": friction,
-                "friction_coefficient": friction / point.force if point.force > 0 else math.nan,
-                "friction_force_across": tangential_force(grid, pressure, displaced[0], slide, across=True),
-                "friction_force_error": step.difference.friction,
-            }
+            row["sliding_distance"] = step.state.distance
+            row["friction_force_across"] = tangential_force(grid, pressure, displaced[0], slide, across=True)
         if not kept:
             return row, {}
-        row["contact_area_error"] = area_error(step, scene, length, pressure, gap, counted, area)
 
         names, beyond = self.problem.settings.fields, dict[str, Array]()  # fields outside the domain
         if not is_whole:
@@ -333,6 +335,28 @@ class LoadingRows(Rows):
         if "gap" in names:
             fields["gap"] = np.where(profile.present, fields["gap"], np.nan)
         return row, fields
+
+    def _area_error(self, step: Step, length: float, gap: Any, counted: float, area: float) -> float:
+        """Return the error of the contact area due to time steps and contact solver. [m2]
+
+        Parameters
+        ----------
+        step : Step
+            An accepted step.
+        length : float
+            Length of the step; zero for a jump. [s]
+        gap : array, shape (nx, ny)
+            Gap between the surfaces. [m]
+        counted, area : float
+            Contact area, counted and corrected for the grid. [m2]
+        """
+        scene, point, difference = self.scene, step.point, step.difference
+        inside, outside = 0.0, 0.0
+        if counted > 0 and point.solver_error > 0:
+            off = SOLVER_AT_EDGE * point.solver_error * point.force / counted
+            closed = off * scene.grid.self_influence * scene.memory.compliance(length)
+            inside, outside = uncertain_area(point.pressure, gap, off, closed, scene.grid.cell_area, scene.present)
+        return area_error(counted, area, difference.inside + inside, difference.outside + outside)
 
     def finish(self, dataset: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
         """Return the result with the memory model and the cycles, and its warnings."""

@@ -61,31 +61,36 @@ def memory_available(device: str = "cpu") -> Available:
     from distributed.system import MEMORY_LIMIT
 
     taken = psutil.Process().memory_info().rss
-    found = [
+    limits = [
         Available(float(psutil.virtual_memory().available), "free in this machine"),
         Available(float(MEMORY_LIMIT - taken), "left of the limit of this machine or container"),
     ]
     with suppress(ValueError):  # raised outside a Dask worker
         limit = get_worker().memory_manager.memory_limit
         if limit:
-            found.append(Available(float(limit - taken), "left of the Dask worker's memory limit"))
-    return min(found, key=lambda one: one.size)
+            limits.append(Available(float(limit - taken), "left of the Dask worker's memory limit"))
+    return min(limits, key=lambda one: one.size)
 
 
 # ---------------------------------------------------------------------------------------------------- memory of a run
 
 #: Fields of a surface in a run (heights, gaps and the mask of present cells), and of one that is generated or read.
-_SURFACE, _MADE = 2.1, 4.0
+_SURFACE = 2.1
+_MADE = 4.0
 #: Fields of a contact problem and its time step, and additional fields for contact on all cells.
-_SOLVE, _IN_CONTACT = 8.4, 13.5
+_SOLVE = 8.4
+_IN_CONTACT = 13.5
 #: Fields of operator and spectrum, and of both on the whole surface if the domain is smaller.
-_TRANSFORMS, _WHOLE = {"periodic": 1.5, "mirror": 1.5, "free": 6.0}, 6.0
+_TRANSFORMS = {"periodic": 1.5, "mirror": 1.5, "free": 6.0}
+_WHOLE = 6.0
 #: Memory of the transforms over these fields: cuFFT also has work areas (not measured).
 _PLANS = {"cpu": 1.0, "gpu": 3.0}
 #: Number of solutions (pressure and displacement) and number of copies of each exponential at the peak. First without
 #: memory; then for a pair of steps with its coarse solution and first guesses; last for a pair of soft steps, with the
 #: ends of its steps and the exponentials of the step before.
-_ELASTIC, _PAIR, _SOFT_PAIR = (2, 0), (5, 5), (7, 9)
+_ELASTIC = (2, 0)
+_PAIR = (5, 5)
+_SOFT_PAIR = (7, 9)
 #: Fields of an exponential if the compliances depend on the wave: a spectrum, padded in free space.
 _SPECTRUM = {"periodic": 1.1, "mirror": 1.1, "free": 4.2}
 #: Fields of a friction curve, measured at 256 x 250: operators, Newton's steps, the vectors of GMRES that are in use; a
@@ -126,7 +131,8 @@ def march_bytes(
     copied into one array, while half the memory of the solve is still in use. Large ones are freed one by one; the
     memory of small ones does not return to the system. Packed pressures take little memory until then.
     """
-    exponentials, layered = memory.times.size, isinstance(memory, LayerMemory)
+    exponentials = memory.times.size
+    layered = isinstance(memory, LayerMemory)
     # a smaller domain also keeps the pressure that causes the displacement
     kept = _SPECTRUM[settings.boundary] if layered else 1.0 if part == 1 else 2.0
     crept = memory.glassy + float(memory.compliances[np.isfinite(memory.times)].sum())
@@ -136,7 +142,8 @@ def march_bytes(
     solved += solutions * ((2.25 * contact if is_packed else 1.0) + kept) + copies * kept * exponentials
     if layered:
         solved += 0.5 * kept * (exponentials + 1)  # symbols
-    frames, surface = rows * len(settings.fields), _SURFACE + (_WHOLE if part < 1 else 0.0)
+    frames = rows * len(settings.fields)
+    surface = _SURFACE + (_WHOLE if part < 1 else 0.0)
     packed = rows if is_packed and part == 1 and "pressure" in settings.fields else 0.0
     dense = frames - packed
     copied = frames + (dense if 8 * cells <= FROM_HEAP else 1.0)
@@ -198,7 +205,8 @@ def too_large(shape: tuple[int, int], needed: Callable[[float], float], there: A
     there : Available
         Available memory.
     """
-    size, fits = needed(math.prod(shape)), PART * there.size
+    size = needed(math.prod(shape))
+    fits = PART * there.size
     if size <= fits:
         return ""
     fitting = "expected more memory, or a coarser grid"

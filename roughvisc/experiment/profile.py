@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -209,7 +210,9 @@ def choose_surface(
     if settings.boundary == "free" and settings.edge == "error" and can_adapt:
         compliance = float(body.material.contact_compliance(program.duration))
         for _ in range(times):
-            profile = Profile(grown(profile.height, GROWTH), settings.missing, body.kernel)
+            larger = grown(profile.height, GROWTH)
+            assert larger is not None, "the surface of an indenter was enlarged before"
+            profile = Profile(larger, settings.missing, body.kernel)
         estimate = estimated(profile, compliance, program)
         while enlarged is None and estimate.at_border and (larger := grown(profile.height, GROWTH)) is not None:
             profile, times = Profile(larger, settings.missing, body.kernel), times + 1
@@ -280,7 +283,7 @@ def estimated(profile: Profile, compliance: float, program: Program) -> Estimate
             approach = max(approach, segment.end + abs(segment.amplitude) if segment.end else 0.0)
         elif not program.prescribes[number]:
             return Estimate()
-    pushes = [{"approach": approach}] if approach > least else []
+    pushes: list[dict[str, Any]] = [{"approach": approach}] if approach > least else []
     if program.largest_load * compliance > 0:
         pushes.append({"load": program.largest_load * compliance / grid.cell_area})
     for push in pushes:

@@ -353,6 +353,7 @@ def sources_of(
     if sample and cutoff is None:
         found[OCTAVE] = Source("cutoff is not given: the shortest wavelength that the real surface has", is_open=True)
     elif sample:
+        assert cutoff is not None
         end, shortest = unit_for(cutoff, "m").text(cutoff, 3), shortest_wave(height)
         found[OCTAVE] = Source(f"the grid holds all waves down to {end}")
         if is_narrow_band(height):
@@ -596,8 +597,12 @@ def budget(
     --------
     roughvisc.audit : the assumptions of the model.
     """
-    given = dict(locals())
-    known = {name: given[name] for name in KNOWN}
+    known = {
+        "modulus_error": modulus_error,
+        "time_scale_error": time_scale_error,
+        "cutoff": cutoff,
+        "population": population,
+    }
     names = listed_names(quantity)
     if not names:
         raise InputError(key="quantity", found=quantity, expected="at least one")

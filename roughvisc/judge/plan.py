@@ -281,9 +281,12 @@ def _scaled_from(run: CoarseRun, done: Case, case: Case, own: Rows) -> dict[str,
     own : Rows
         Its rows, not computed.
     """
-    load = own.scene.program.largest_load if isinstance(own, LoadingRows) else 0.0
-    if not (load > 0 and run.force > 0) or own.problem.settings.boundary == "free":
-        return {"contact_fraction": np.nan, "nominal_pressure": np.nan}  # an approach, a friction curve, an indenter
+    unknown = {"contact_fraction": np.nan, "nominal_pressure": np.nan}
+    if not isinstance(own, LoadingRows) or own.problem.settings.boundary == "free":
+        return unknown  # a friction curve, an indenter
+    load = own.scene.program.largest_load
+    if not (load > 0 and run.force > 0):
+        return unknown  # an approach
     compliances = [
         float(one.body.material.contact_compliance(one.experiment.program.duration))
         for one in (case, done)
@@ -374,8 +377,9 @@ def timed_convolution(rows: Rows, touching: float) -> float:
     for _ in range(2):  # the first solve allocates memory
         began, before = time.thread_time(), grid.convolutions
         with suppress(ConvergenceError):
-            few = {"tolerance": 1e-11, "max_iterations": _ITERATIONS, "present": present}
-            solve_contact(grid, gap, load=load, start=start, **few)
+            solve_contact(
+                grid, gap, load=load, start=start, tolerance=1e-11, present=present, max_iterations=_ITERATIONS
+            )
         times.append((time.thread_time() - began) / max(grid.convolutions - before, 1))
     return min(times)
 
@@ -440,7 +444,7 @@ def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Availab
         "disk": _VARIABLES[kind] + disk(case, whole.size, rows, run.steps, part * float(run.contact.mean())),
         "note": note.strip(),
         "warning": warning,
-        "refusal": too_large(whole.shape, needed, there),
+        "refusal": too_large((whole.shape[0], whole.shape[1]), needed, there),
     }
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -123,7 +124,8 @@ def trade(
     reference, looser = (sharpest / _SHARPER, finest), (sharpest, finest)
     second, third = ((reference[0], part * finest) for part in (2.0, 4.0))
     wanted = dict.fromkeys([*rungs, looser, third, second, reference])
-    times, experiment = case.settings.times or _FEW, case.experiment
+    times: Any = case.settings.times or _FEW
+    experiment = case.experiment
     shapes = {one: shape_on(case, height, one[1]) for one in wanted}
     if isinstance(experiment, Loading):
         sides = np.array(spacing(height)) * height.shape / np.array(list(shapes.values()))

@@ -126,7 +126,8 @@ def choose(
     height, smallest = case.height(), min(targets.values())
     base = neighbours.with_kept(case, [field for one in observed for field in one.fields])
     tolerance = min(max(_PART * smallest, _SMALLEST), _LARGEST)
-    axis, places = case.experiment.axis, case.settings.times if isinstance(case.settings.times, tuple) else None
+    axis = case.experiment.axis
+    places: Any = case.settings.times if isinstance(case.settings.times, tuple) else None
     if places is None and axis == "time":
         places = case.program.corners
 

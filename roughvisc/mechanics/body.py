@@ -132,9 +132,12 @@ class HalfSpace(Kernel):
         .. [2] K. L. Johnson, *Contact Mechanics*, CUP, 1985, eq. (3.25).
         """
         longer = max(spacing)
-        dx, dy = spacing[0] / longer, spacing[1] / longer  # unit neutrality: all lengths in longer sides
+        # unit neutrality: all lengths in longer sides
+        dx = spacing[0] / longer
+        dy = spacing[1] / longer
         x, y = np.meshgrid(np.arange(shape[0]) * dx, np.arange(shape[1]) * dy, indexing="ij", copy=False)
-        distance, kernel = np.hypot(x, y), np.empty(shape)
+        distance = np.hypot(x, y)
+        kernel = np.empty(shape)
         half = x >= y if dx == dy and shape[0] == shape[1] else np.ones(shape, bool)  # a square grid is symmetric
 
         near = half & (distance <= _GAUSS[0][0])
@@ -175,7 +178,9 @@ def corner_sum(x: Array, y: Array, dx: float, dy: float, depth: float = 0.0) -> 
     """
     total = np.zeros_like(x)
     for sx, sy in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
-        a, b = x + sx * dx / 2, y + sy * dy / 2  # never zero: centres lie half a side from the edges
+        # never zero: centres lie half a side from the edges
+        a = x + sx * dx / 2
+        b = y + sy * dy / 2
         corner = a * np.arcsinh(b / np.hypot(a, depth)) + b * np.arcsinh(a / np.hypot(b, depth))
         if depth:
             corner -= depth * np.arctan(a * b / (depth * np.sqrt(a**2 + b**2 + depth**2)))
@@ -234,7 +239,8 @@ def periodic_symbol(
     InputError
         If the transfer function of a body is not positive.
     """
-    (nx, ny), (dx, dy) = shape, spacing
+    nx, ny = shape
+    dx, dy = spacing
     qx = 2 * math.pi / (nx * dx) * np.arange(nx // 2 + 1.0)
     qy = 2 * math.pi / (ny * dy) * np.arange(ny // 2 + 1.0)
     symbol = np.array(kernel.transfer(qx[:, None], qy[None, :]), dtype=float)

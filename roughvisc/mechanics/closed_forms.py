@@ -176,7 +176,8 @@ def flat_punch(radius: Quantity, contact_modulus: Quantity, force: Quantity) -> 
     ----------
     .. [1] K. L. Johnson, *Contact Mechanics*, Cambridge University Press, 1985, section 3.4.
     """
-    a, approach = radius, force / (2 * contact_modulus * radius)
+    a = radius
+    approach = force / (2 * contact_modulus * radius)
 
     def pressure(r: ArrayLike) -> Array:
         s = np.abs(np.asarray(r, dtype=float))
@@ -253,7 +254,8 @@ def westergaard(
     >>> round(contact.contact_fraction, 12)
     0.5
     """
-    mean, full = mean_pressure, np.pi * contact_modulus * amplitude / wavelength
+    mean = mean_pressure
+    full = np.pi * contact_modulus * amplitude / wavelength
 
     def pressure(x: ArrayLike) -> Array:
         phase = np.pi * np.asarray(x, dtype=float) / wavelength
@@ -320,7 +322,9 @@ class GrowingContact:
     def radius(self, t: ArrayLike) -> Array:
         """Return the contact radius at times ``t``, after a jump. [s] -> [m]"""
         since = np.asarray(t, dtype=float)
-        crept, load = np.zeros(since.shape), 0.0  # int C dW, a sum over the corners of the program
+        # int C dW, a sum over the corners of the program
+        crept = np.zeros(since.shape)
+        load = 0.0
         for segment, start in zip(self.program.segments, self.program.corners, strict=False):
             rise = 0.0 if segment.end is None else segment.end - load
             age = np.maximum(since - start, 0.0)

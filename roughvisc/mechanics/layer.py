@@ -34,22 +34,28 @@ _WAVES_TOGETHER = 1 << 16
 # Wave number times the thickness of the thinnest layer from which on a wave depends on the top layer alone, to 1e-11.
 # Number of decades of the wave number times the whole thickness, below one, searched for waves that depend on the
 # half-space alone.
-_SHORT, _DECADES = 15.0, 9
+_SHORT = 15.0
+_DECADES = 9
 # Numbers of waves per decade at which a series is computed: the first whose interpolant is accurate enough is used.
 # Error of the interpolant, as a fraction of the tolerance.
-_WAVES_PER_DECADE, _INTERPOLATED = (10, 14, 20, 30, 45), 0.2
+_WAVES_PER_DECADE = (10, 14, 20, 30, 45)
+_INTERPOLATED = 0.2
 # Compliances of waves below this part of the largest one are compared with that part: on a base that is almost rigid
 # the compliance of long waves is rounding. In free space the images fit compliances below the second part with the
 # error of that part. Relative to smaller compliances the fit loses all digits.
-_STIFF, _FAR = 1e-9, 1e-6
+_STIFF = 1e-9
+_FAR = 1e-6
 # Retardation times per decade to try in a fit, and factor by which their range exceeds the range of ages.
-_OFFERED, _BEYOND = (0, 1, 1.5, 2, 3, 4, 5, 6, 8, 10, 12, 14, 17, 20, 24, 28, 34, 40, 48, 57, 68), 10.0
+_OFFERED = (0, 1, 1.5, 2, 3, 4, 5, 6, 8, 10, 12, 14, 17, 20, 24, 28, 34, 40, 48, 57, 68)
+_BEYOND = 10.0
 # Depths of images per decade, from this part of the thinnest layer's thickness on. The response of elastic layers is
 # right to 1e-5 for moduli up to 1,000 apart and to 1e-4 for moduli up to 100,000 apart (measured).
-_IMAGES_PER_DECADE, _SHALLOWEST = 14, 0.8
+_IMAGES_PER_DECADE = 14
+_SHALLOWEST = 0.8
 # Distance from the loaded cell, in cell sides, up to which its displacement is computed in closed form. Number of
 # Gauss points a side used beyond this distance.
-_NEAR_CELLS, _GAUSS_POINTS = 12.0, 4
+_NEAR_CELLS = 12.0
+_GAUSS_POINTS = 4
 
 
 # ------------------------------------------------------------------------------------------------------------- waves
@@ -119,8 +125,11 @@ def effective_compliance(
 
 def _partial_waves(poisson: float) -> tuple[Array, Array, Array, Array]:
     """Return displacement ``(U, W)`` and traction over ``2 q`` of unit waves: decaying ones, then growing ones."""
-    k, b, c = 3 - 4 * poisson, 1 - 2 * poisson, 2 - 2 * poisson
-    down, down_stress = np.array([[1, 0], [1, k]]), -np.array([[1, b], [1, c]])
+    k = 3 - 4 * poisson
+    b = 1 - 2 * poisson
+    c = 2 - 2 * poisson
+    down = np.array([[1, 0], [1, k]])
+    down_stress = -np.array([[1, b], [1, c]])
     turned = np.array([[1, -1], [-1, 1]])
     return down, down_stress, down * turned, -down_stress * turned
 
@@ -166,9 +175,11 @@ class LayerKernel(Kernel):
 
     def influence(self, shape: tuple[int, int], spacing: tuple[float, float]) -> Array:
         """Return Love's kernel and the images, for cells of any length. [m]"""
-        shallowest, deepest = _SHALLOWEST * _SHORT / self.q[-1], 1 / self.q[0]
+        shallowest = _SHALLOWEST * _SHORT / self.q[-1]
+        deepest = 1 / self.q[0]
         depths = np.geomspace(shallowest, deepest, math.ceil(_IMAGES_PER_DECADE * math.log10(deepest / shallowest)))
-        q, short = np.geomspace(self.q[0], self.q[-1], 3 * depths.size), self.compliance[-1]
+        q = np.geomspace(self.q[0], self.q[-1], 3 * depths.size)
+        short = self.compliance[-1]
         # the last equation is the limit of long waves
         scale = np.append(np.interp(np.log(q), np.log(self.q), self.scale), self.scale[0])
         wanted = (np.append(interpolated(q, self.q, self.compliance), self.compliance[0]) - short) / scale
@@ -192,17 +203,20 @@ def image_influence(shape: tuple[int, int], spacing: tuple[float, float], depths
     ndarray, shape (nx, ny)
         Averages over the loaded cell: near it in closed form, beyond by Gauss quadrature. [m]
     """
-    (dx, dy), unit = spacing, float(depths[0])
+    dx, dy = spacing
+    unit = float(depths[0])
     x, y = np.broadcast_arrays(dx * np.arange(shape[0])[:, None], dy * np.arange(shape[1]))
     farthest = math.hypot(shape[0] * dx, shape[1] * dy)
-    at = unit * np.geomspace(1, 1 + farthest / unit, math.ceil(400 * math.log10(1 + farthest / unit)) + 8) - unit
-    total = (weights / np.sqrt(at[:, None] ** 2 + depths**2)).sum(axis=1) / math.pi
-    along = scipy.interpolate.CubicSpline(np.log1p(at / unit), total)
-    found = cell_mean(lambda r: along(np.log1p(r / unit)), x, y, spacing, (_GAUSS_POINTS, _GAUSS_POINTS)) * (dx * dy)
+    radii = unit * np.geomspace(1, 1 + farthest / unit, math.ceil(400 * math.log10(1 + farthest / unit)) + 8) - unit
+    total = (weights / np.sqrt(radii[:, None] ** 2 + depths**2)).sum(axis=1) / math.pi
+    along = scipy.interpolate.CubicSpline(np.log1p(radii / unit), total)
+    influence = cell_mean(lambda r: along(np.log1p(r / unit)), x, y, spacing, (_GAUSS_POINTS, _GAUSS_POINTS)) * (
+        dx * dy
+    )
     near = np.hypot(x, y) <= _NEAR_CELLS * max(spacing)
     images = zip(depths, weights, strict=True)
-    found[near] = sum(weight / math.pi * corner_sum(x[near], y[near], dx, dy, depth) for depth, weight in images)
-    return found
+    influence[near] = sum(weight / math.pi * corner_sum(x[near], y[near], dx, dy, depth) for depth, weight in images)
+    return influence
 
 
 def interpolated(q: Array, known: ArrayLike, values: ArrayLike) -> Array:
@@ -276,7 +290,8 @@ def crept(times: ArrayLike, t: ArrayLike) -> Array:
 
     These are ``1 - exp(-t / tau_m)``, the age ``t`` itself for an infinite time, and last one.
     """
-    age, tau = np.asarray(t, dtype=float)[..., None], np.append(times, 1.0)
+    age = np.asarray(t, dtype=float)[..., None]
+    tau = np.append(times, 1.0)
     weights = np.where(np.isinf(tau), age, -np.expm1(-age / tau))
     weights[..., -1] = 1.0
     return weights
@@ -305,23 +320,27 @@ def layer_series(body: LayeredBody, shortest: float, duration: float, tolerance:
     q, between, error = _known_waves(body, t, tolerance)
     at_once = body.at_once(q)
     best = LayerSeries(q, (), at_once[None], duration, error if duration == 0 else math.inf)
-    exact, expected = body.creep(q, t), body.creep(between, t)
-    first, last = shortest / _BEYOND, duration * _BEYOND
-    for per_decade in _OFFERED if duration > 0 else ():
+    exact = body.creep(q, t)
+    expected = body.creep(between, t)
+    first = shortest / _BEYOND
+    last = duration * _BEYOND
+    if duration == 0:
+        return best
+    for per_decade in _OFFERED:
         times = body.times(first, last, per_decade)
         if last in times or any(one.fluidity > 0 for one in body.materials):
             times = np.append(times, math.inf)
         terms = crept(times, t)[:, :-1]
         weights = np.array([nonnegative(terms, row - zero, row) for zero, row in zip(at_once, exact, strict=True)])
         used = (weights[:, None] * terms / exact[..., None]).max(axis=(0, 1)) > 1e-9
-        found = replace(best, times=tuple(times[used]), compliances=np.vstack([weights[:, used].T, at_once]))
-        course = crept(found.times, t)
-        of_waves = (found.compliances, exact), (interpolated(between, q, found.compliances), expected)
+        fitted = replace(best, times=tuple(times[used]), compliances=np.vstack([weights[:, used].T, at_once]))
+        course = crept(fitted.times, t)
+        of_waves = (fitted.compliances, exact), (interpolated(between, q, fitted.compliances), expected)
         error = max(
             float((np.abs((course @ one).T / known - 1) * np.minimum(known / (_STIFF * known.max()), 1.0)).max())
             for one, known in of_waves
         )
-        best = replace(found, error=error) if error < best.error else best
+        best = replace(fitted, error=error) if error < best.error else best
         if error <= tolerance:
             break
     return best
@@ -329,7 +348,9 @@ def layer_series(body: LayeredBody, shortest: float, duration: float, tolerance:
 
 def _known_waves(body: LayeredBody, t: Array, tolerance: float) -> tuple[Array, Array, float]:
     """Return wave numbers to interpolate between, others between them [1/m], and the error of the interpolant."""
-    whole, thinnest, few = sum(body.thicknesses), min(body.thicknesses), t[:: max(t.size // 4, 1)]
+    whole = sum(body.thicknesses)
+    thinnest = min(body.thicknesses)
+    few = t[:: max(t.size // 4, 1)]
 
     def known(q: NDArray[Any]) -> Array:
         return np.vstack([body.at_once(q), body.creep(q, few).T])
@@ -409,8 +430,8 @@ class LayeredBody(Body):
             shear = np.array([one.laplace(1j * frequency) for one in self.materials])
         flows = ~np.isfinite(shear).all(axis=0)
         shear[:, flows] = 1.0
-        found = effective_compliance(np.where(q > 0, q, 1.0), self.thicknesses, self.poissons, list(shear))
-        return HALF_SPACE.transfer(qx, qy), np.where(flows, complex(math.inf, 0.0), found)
+        compliance = effective_compliance(np.where(q > 0, q, 1.0), self.thicknesses, self.poissons, list(shear))
+        return HALF_SPACE.transfer(qx, qy), np.where(flows, complex(math.inf, 0.0), compliance)
 
     def at_once(self, q: Array) -> Array:
         """Return the instantaneous effective contact compliance of waves. [1/Pa]"""
@@ -431,13 +452,14 @@ class LayeredBody(Body):
         """
         count = 24  # nodes on both sides of the real axis: 5e-10 (measured)
         angle = np.arange(1, count, 2) * math.pi / count
-        cotangent, sine = 1 / np.tan(0.6407 * angle), np.sin(0.6407 * angle)
+        cotangent = 1 / np.tan(0.6407 * angle)
+        sine = np.sin(0.6407 * angle)
         z = count * (-0.4814 + 0.6122 * angle * cotangent + 0.2645j * angle)
         slope = 0.6122 * cotangent - 0.6122 * 0.6407 * angle / sine**2 + 0.2645j
         weights = 2 * np.exp(z) * slope / z
         shear = [one.laplace(z / t[:, None]) for one in self.materials]
-        found = effective_compliance(q[:, None, None], self.thicknesses, self.poissons, shear)
-        return np.asarray((found @ weights).imag)
+        compliance = effective_compliance(q[:, None, None], self.thicknesses, self.poissons, shear)
+        return np.asarray((compliance @ weights).imag)
 
     def times(self, shortest: float, longest: float, per_decade: float) -> Array:
         """Return possible retardation times of waves: the times of the materials, and a number per decade between.
@@ -449,11 +471,11 @@ class LayeredBody(Body):
         with np.errstate(divide="ignore"):  # at a retardation time of the material
             signs = np.sign([one.laplace(-1 / place) for one in self.materials])
         apart = scipy.ndimage.binary_dilation((signs != signs[0]).any(axis=0))
-        found = {min(max(time, shortest), longest) for one in self.materials for time in one.times}
+        offered = {min(max(time, shortest), longest) for one in self.materials for time in one.times}
         for (part,) in scipy.ndimage.find_objects(scipy.ndimage.label(apart)[0]):
             first, *_, end = place[part]
-            found.update(lattice(first, end, per_decade).tolist())
-        return np.array(sorted(found))
+            offered.update(lattice(first, end, per_decade).tolist())
+        return np.array(sorted(offered))
 
     def facts(self, end: float) -> dict[str, Any]:
         """Return the compliances of the top layer [1/Pa], and the body in words."""

@@ -97,7 +97,9 @@ def conjugate_gradients(
     if load == 0:
         return np.zeros_like(gap), float(np.min(gap)), 0
     pressure = np.full(gap.shape, load / (grid.cell_area * gap.size))  # (1), uniform
-    direction, last, restart = np.zeros_like(gap), 1.0, True
+    direction = np.zeros_like(gap)
+    last = 1.0
+    restart = True
     for iteration in range(1, most + 1):
         touching = pressure > 0  # (3) Printed: all points
         opening = gap + compliance * grid.displacement(pressure)  # (2)

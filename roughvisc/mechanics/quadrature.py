@@ -17,5 +17,5 @@ def panels(count: int, end: float, points: int) -> tuple[Array, Array]:
     """Return Gauss nodes and weights on equal parts of the interval from zero to an end."""
     nodes, weights = rule(points)
     side = end / count
-    at = (np.arange(count)[:, None] + (nodes + 1) / 2) * side
-    return at.ravel(), np.tile(weights * side / 2, count)
+    places = (np.arange(count)[:, None] + (nodes + 1) / 2) * side
+    return places.ravel(), np.tile(weights * side / 2, count)

@@ -27,12 +27,14 @@ BASE: Base = "bonded"
 # Distance in thicknesses beyond which the kernel is set to zero: it is below 1e-17 of its value at one thickness.
 _REACH = 46.0
 # Nodes of the correction per thickness, and degree of the spline through them: error below 1e-14.
-_PER_THICKNESS, _DEGREE = 16, 9
+_PER_THICKNESS = 16
+_DEGREE = 9
 # Cell side in thicknesses, and number of Gauss points per side that give the mean of the correction to 1e-13. Cells
 # with a longer side are long.
 _GAUSS = ((0.01, 2), (0.05, 3), (0.15, 4), (0.5, 7))
 # Below this x, sinh(2 x) - 2 x is computed from its series, with these coefficients.
-_SERIES_BELOW, _SERIES = 0.5, 1 / np.cumprod(np.arange(2.0, 27))[1::2]
+_SERIES_BELOW = 0.5
+_SERIES = 1 / np.cumprod(np.arange(2.0, 27))[1::2]
 
 
 @quantities(thickness="m")
@@ -180,13 +182,17 @@ def factors(x: ArrayLike, poisson: float, base: Base) -> tuple[Array, Array]:
         Each between 0 and 1, and exact to rounding for every `x`.
     """
     x = np.asarray(x, dtype=float)
-    e, four = np.exp(-2 * x), -np.expm1(-4 * x)
+    e = np.exp(-2 * x)
+    four = -np.expm1(-4 * x)
     if base == "slipping":
-        two, denominator = -np.expm1(-2 * x), four + 4 * x * e
+        two = -np.expm1(-2 * x)
+        denominator = four + 4 * x * e
         return two**2 / denominator, 2 * e * (2 * x + two) / denominator
-    k, rest = 3 - 4 * poisson, 2 * x**2 + 5 - 12 * poisson + 8 * poisson**2
+    k = 3 - 4 * poisson
+    rest = 2 * x**2 + 5 - 12 * poisson + 8 * poisson**2
     denominator = k * (1 + e * e) + 2 * e * rest
-    excess, small = np.asarray(four - 4 * x * e), x < _SERIES_BELOW
+    excess = np.asarray(four - 4 * x * e)
+    small = x < _SERIES_BELOW
     y = 2 * x[small]  # sinh(y) - y, whose terms cancel if y is small, is a series
     excess[small] = 2 * e[small] * (y**3 * np.polynomial.polynomial.polyval(y**2, _SERIES))
     return (excess + (k - 1) * four) / denominator, 2 * e * (k * e + rest + 2 * x) / denominator
@@ -198,8 +204,8 @@ def _correction(poisson: float, base: Base) -> Any:
     s, weights = panels(96, 24.0, 16)  # there 1 - S, which decreases as s^2 exp(-2 s), is below rounding
     amplitude = weights * factors(s, poisson, base)[1] / math.pi
     # the function is even: nodes before zero keep the end of the spline away from zero
-    at = np.linspace(-1.0, _REACH, math.ceil((1.0 + _REACH) * _PER_THICKNESS))
-    values = np.array([amplitude @ scipy.special.j0(r * s) for r in at])
-    spline = scipy.interpolate.make_interp_spline(at, values, _DEGREE)
-    powers = [spline(at[:-1], order) / math.factorial(order) for order in range(_DEGREE, -1, -1)]
-    return scipy.interpolate.PPoly(powers, at)  # quicker than a B-spline
+    places = np.linspace(-1.0, _REACH, math.ceil((1.0 + _REACH) * _PER_THICKNESS))
+    values = np.array([amplitude @ scipy.special.j0(r * s) for r in places])
+    spline = scipy.interpolate.make_interp_spline(places, values, _DEGREE)
+    powers = [spline(places[:-1], order) / math.factorial(order) for order in range(_DEGREE, -1, -1)]
+    return scipy.interpolate.PPoly(powers, places)  # quicker than a B-spline

@@ -54,9 +54,12 @@ _FORCING = 0.3
 # Iterations after which the method follows the central path closely: fraction that replaces the last one, and least
 # product of the next iterate over the product of this one, without the second-order term. Otherwise the iterates may
 # recur if two cells compete for the load, as in 7 of 1,500 contacts of one or two cells.
-_MANY, _STRICT, _CENTRED = 30, 1e-3, 0.5
+_MANY = 30
+_STRICT = 1e-3
+_CENTRED = 0.5
 # Largest residual of GMRES over the right-hand side: in any step, and in the step that gives the stated error.
-_LOOSEST, _STATED = 0.5, 0.05
+_LOOSEST = 0.5
+_STATED = 0.05
 # Stiffest over softest wave up to which the preconditioner of a body with losses computes in single precision. Measured
 # on random profiles on Kelvin-Voigt materials and on series with little instantaneous compliance: up to 1e4 the
 # precision does not change the number of convolutions. From 3e4 on single precision needs up to 1.5 times as many, and
@@ -67,7 +70,8 @@ _INSIDE = 0.995
 # Least separation at the start, over the range of the gap.
 _START = 0.3
 # Vectors of GMRES before a restart, and in total.
-_RESTART, _MOST_VECTORS = 60, 300
+_RESTART = 60
+_MOST_VECTORS = 300
 # Largest residual of a solution over the residual at which GMRES stops, because of rounding.
 _REACHED = 1.5
 # A vector is orthogonalised a second time if its length falls below this fraction of its projection.
@@ -93,6 +97,8 @@ class SteadyState:
         Estimated error of the pressure: sum of its absolute values over the load. [-]
     friction_residual : float
         Estimated relative error of the power force. [-]
+    cell_error : float
+        Estimated error of the pressure of a cell, the largest. [Pa]
     """
 
     pressure: Array
@@ -101,6 +107,7 @@ class SteadyState:
     power_force: float
     residual: float
     friction_residual: float
+    cell_error: float
 
 
 class Sliding:
@@ -132,9 +139,11 @@ class Sliding:
     def __init__(
         self, body: Body, shape: tuple[int, int], spacing: tuple[float, float], speed: float, xp: Any = np
     ) -> None:
-        (nx, ny), (dx, dy) = shape, spacing
+        nx, ny = shape
+        dx, dy = spacing
         #: Wave numbers along x and along y, of a real transform. [1/m]
-        self.qx, self.qy = 2 * math.pi * fft.fftfreq(nx, dx)[:, None], 2 * math.pi * fft.rfftfreq(ny, dy)[None, :]
+        self.qx = 2 * math.pi * fft.fftfreq(nx, dx)[:, None]
+        self.qy = 2 * math.pi * fft.rfftfreq(ny, dy)[None, :]
         response, complex_compliance = body.waves(self.qx, self.qy, -self.qx * speed)
         complex_compliance = np.where(response > 0, complex_compliance, 0.0)
         if not np.isfinite(complex_compliance[0, 0]):  # uniform pressure compresses the body without end
@@ -153,7 +162,8 @@ class Sliding:
         displaced = complex_compliance.real * response + skew
         # Pressure over displacement of each wave; waves without displacement count as the softest. [Pa/m]
         stiffness = 1 / np.where(displaced == 0, np.abs(displaced).max(), displaced)
-        stiffest, softest = float(np.abs(stiffness).max()), float(np.abs(stiffness).min())
+        stiffest = float(np.abs(stiffness).max())
+        softest = float(np.abs(stiffness).min())
         is_single = stiffest <= _SINGLE_PRECISION * softest or not skew.any()
         precision = np.complex64 if is_single else np.complex128
         #: Displacement over pressure of each wave. [m/Pa]
@@ -164,10 +174,10 @@ class Sliding:
         #: Number of convolutions so far, including the preconditioner.
         self.convolutions = 0
         self.cell_area = dx * dy
-        one = xp.zeros(shape)
-        one[0, 0] = 1.0
+        unit_pressure = xp.zeros(shape)
+        unit_pressure[0, 0] = 1.0
         #: Displacement of a cell under unit pressure on that cell alone. [m/Pa]
-        self.self_influence = float(self.displacement(one)[0, 0])
+        self.self_influence = float(self.displacement(unit_pressure)[0, 0])
 
     def displacement(self, pressure: Array) -> Array:
         """Return the displacement of a pressure. [m]"""
@@ -180,8 +190,8 @@ class Sliding:
         """
         symbol, unit = self._stiffness
         most = float(abs(displacement).max()) or 1.0  # single precision underflows
-        found = self._convolved((displacement / most).astype(symbol.real.dtype), symbol)
-        return found.astype(float) * (most * unit)
+        stiffened = self._convolved((displacement / most).astype(symbol.real.dtype), symbol)
+        return stiffened.astype(float) * (most * unit)
 
     def slope(self, pressure: Array, axis: int = 0) -> Array:
         r"""Return the slope, along x or y, of the part of the displacement that is out of phase with the pressure.
@@ -229,11 +239,12 @@ def steady_state(
     ConvergenceError
         If the residuals do not reach the tolerance.
     """
-    xp, total = namespace(gap), load / sliding.cell_area
+    xp = namespace(gap)
+    total = load / sliding.cell_area
     pressure = xp.full(gap.shape, total / gap.size)
     opening = gap + sliding.displacement(pressure)
     if xp.ptp(gap) == 0:  # uniform pressure, without friction
-        return SteadyState(pressure, opening - gap, float(opening.mean()), 0.0, 0.0, 0.0)
+        return SteadyState(pressure, opening - gap, float(opening.mean()), 0.0, 0.0, 0.0, 0.0)
     approach = float(opening.min()) - _START * float(xp.ptp(opening))
     separation = opening - approach
     errors = math.inf, math.inf
@@ -247,8 +258,8 @@ def steady_state(
         diagonal = separation / pressure
         system = _NewtonSystem(sliding, diagonal)
         contact = (pressure * sliding.self_influence > separation) | (separation == separation.min())
-        found = xp.where(contact, pressure, 0.0)
-        found *= total / float(found.sum())
+        trial = xp.where(contact, pressure, 0.0)
+        trial *= total / float(trial.sum())
 
         # Predictor: Newton's step to the solution. It corrects the pressure, which is restricted to the contact. The
         # force is a quadratic form of the pressure. The term of second order counts if the pressure is almost uniform:
@@ -260,11 +271,12 @@ def steady_state(
             step, approach_step, is_accurate = system.solve(right, enough, relative, step)
             if not math.isfinite(float(step.sum())):  # the tolerance is below rounding
                 raise ConvergenceError(unsolved(iteration, max(errors), tolerance))
-            correction, of_force = pressure + step - found, 0.0
-            of_pressure = _CAUTION * float(abs(correction).sum() / found.sum())
+            correction = pressure + step - trial
+            of_force = 0.0
+            of_pressure = _CAUTION * float(abs(correction).sum() / trial.sum())
             if of_pressure <= tolerance:
-                slope = sliding.slope(found)
-                force = -float((found * slope).sum()) * sliding.cell_area
+                slope = sliding.slope(trial)
+                force = -float((trial * slope).sum()) * sliding.cell_area
                 change = -float((correction * (2 * slope + sliding.slope(correction))).sum()) * sliding.cell_area
                 of_force = _CAUTION * abs(change) / abs(force + change) if change else 0.0
             errors = of_pressure, of_force
@@ -272,9 +284,10 @@ def steady_state(
                 break
         else:
             if is_accurate:
-                displacement = sliding.displacement(found)
-                approach = float((found * (gap + displacement)).sum()) / total
-                return SteadyState(found, displacement, approach, force, *errors)
+                displacement = sliding.displacement(trial)
+                approach = float((trial * (gap + displacement)).sum()) / total
+                of_cell = _CAUTION * float(abs(correction).max())
+                return SteadyState(trial, displacement, approach, force, *errors, of_cell)
         widening = -separation - diagonal * step
         length = min(_longest(pressure, step), _longest(separation, widening))
         reached = float(((pressure + length * step) * (separation + length * widening)).sum())
@@ -306,7 +319,8 @@ class _NewtonSystem:
     """
 
     def __init__(self, sliding: Sliding, diagonal: Array) -> None:
-        self._sliding, self._diagonal = sliding, diagonal
+        self._sliding = sliding
+        self._diagonal = diagonal
         both = sliding.self_influence + diagonal
         xp = namespace(diagonal)
         self._scale = 1 / xp.sqrt(both)
@@ -330,7 +344,9 @@ class _NewtonSystem:
         start : array, shape (nx, ny), optional
             First guess of the change of the pressure. [Pa]
         """
-        scaled, step, vectors = self._scaled(right), start, 0
+        scaled = self._scaled(right)
+        step = start
+        vectors = 0
         norm = whole = math.sqrt(float((scaled**2).sum()))
         enough = min(enough, relative * norm)
         if start is not None:
@@ -347,7 +363,8 @@ class _NewtonSystem:
             change = self._precondition(solution)
             step, vectors = change if step is None else step + change, vectors + count
             right = right - self._product(change)
-            scaled, before = self._scaled(right), norm
+            scaled = self._scaled(right)
+            before = norm
             norm = math.sqrt(float((scaled**2).sum()))
             if not _REACHED * enough < norm < before / 2 or vectors >= _MOST_VECTORS:
                 break
@@ -396,14 +413,19 @@ def gmres(operator: Callable[[Array], Array], right: Array, enough: float) -> tu
     between this process and the workers of Dask. CuPy's GMRES stops only at a restart. ``einsum`` does not call BLAS
     here.
     """
-    xp, shape = namespace(right), right.shape
-    residual, solution, count = right.reshape(-1), xp.zeros(right.size), 0
+    xp = namespace(right)
+    shape = right.shape
+    residual = right.reshape(-1)
+    solution = xp.zeros(right.size)
+    count = 0
     norm = math.sqrt(float(xp.einsum("i,i->", residual, residual)))
     directions = xp.empty((_RESTART + 1, right.size))
     while norm > enough and count < _MOST_VECTORS:
         # The first direction is the residual; each further direction is the image of the last one, orthonormalised.
         directions[0] = residual / norm
-        triangle, along_residual, size = np.zeros((_RESTART, _RESTART)), np.zeros(_RESTART), 0
+        triangle = np.zeros((_RESTART, _RESTART))
+        along_residual = np.zeros(_RESTART)
+        size = 0
         for k in range(_RESTART):
             image = operator(directions[k].reshape(shape)).reshape(-1)
             for _ in range(2):  # Gram-Schmidt, a second time if little is left

@@ -37,8 +37,10 @@ def slope(field: Array, side: float, axis: int) -> Array:
     array, shape (nx, ny)
         Slope; zero for the shortest wave of an even number of cells. [unit of the field / m]
     """
-    xp, count = namespace(field), field.shape[axis]
-    fft, waves = fft_of(xp), 2 * math.pi * scipy.fft.rfftfreq(count, side)
+    xp = namespace(field)
+    count = field.shape[axis]
+    fft = fft_of(xp)
+    waves = 2 * math.pi * scipy.fft.rfftfreq(count, side)
     if count % 2 == 0:
         waves[-1] = 0.0
     waves = waves[:, None] if axis == 0 else waves
@@ -62,7 +64,8 @@ def tangential_force(grid: Grid, pressure: Array, displacement: Array, slide: Sl
         degrees counter-clockwise from the motion, with x to the right and y upwards: y for a motion along x, -x for a
         motion along y.
     """
-    axis, sense = slide.axis, slide.sense
+    axis = slide.axis
+    sense = slide.sense
     if across:
         axis, sense = 1 - axis, sense if axis == 0 else -sense
     inclined = slope(displacement, grid.spacing[axis], axis)

@@ -61,12 +61,14 @@ Numbers = NDArray[np.integer[Any]]
 #: Relative error of the conductance at which the iteration ends.
 _CLOSE = 1e-9
 #: Number of cells from which two grids are used, and relative error of the energy in each round on them.
-_LARGE, _ON_TWO_GRIDS = 2**12, (1e-16, 1e-2, 1e-2, 1e-2)
+_LARGE = 2**12
+_ON_TWO_GRIDS = (1e-16, 1e-2, 1e-2, 1e-2)
 #: Largest number of rounds with direct factors.
 _BY_FACTORS = 8
 #: Largest number of rounds of the elimination without subtractions, and its largest number of multiplications: some
 #: seconds.
-_BY_ELIMINATION, _MOST_PRODUCTS = 9, 2**32
+_BY_ELIMINATION = 9
+_MOST_PRODUCTS = 2**32
 #: Number of cells along the side of a block: larger blocks mean fewer coarse cells and more iterations.
 _BLOCK = 4
 #: A face is strong if its conductance is at least this part of the geometric mean of the diagonals of its two cells.
@@ -80,13 +82,16 @@ _SHIFT = 1e-14
 
 # Factors of the difference to cells of half the side: along the cells, oblique, and the share of faces in steps from
 # which an outline counts as oblique (a disc has 0.59). Squares of 64 cells at 0 to 45 degrees: within 9e-4.
-_ALONG, _OBLIQUE, _STEPS = 2.0, 1.2, 0.6
+_ALONG = 2.0
+_OBLIQUE = 1.2
+_STEPS = 0.6
 # Error of the extrapolated value over the same difference.
 _OFF = 0.4
 # Error of the position of an edge where the gap opens, in cells: the error common to all faces, and three standard
 # deviations of one face, since the edge lies anywhere in its cell. Rough surfaces of 32 to 128 cells: within 0.6 of the
 # estimate.
-_SHARED, _SCATTER = 0.03, 1.0
+_SHARED = 0.03
+_SCATTER = 1.0
 # Error of the pressure over the square root of the error of the stiffness, which is of second order.
 _OF_PRESSURE = 0.1
 
@@ -181,11 +186,13 @@ def flow(gap: Array, spacing: tuple[float, float], *, wrap: bool = False) -> Flo
     .. [1] B. J. Hamrock, S. R. Schmid, B. O. Jacobson, Fundamentals of Fluid Film Lubrication, 2004, chapter 7.
     .. [2] P. G. Doyle, J. L. Snell, Random Walks and Electric Networks, MAA, 1984, section 1.3.5.
     """
-    widest, (nx, ny) = float(gap.max(initial=0.0)), gap.shape
+    widest = float(gap.max(initial=0.0))
+    nx, ny = gap.shape
     mobility = (np.maximum(gap, 0.0) / (widest or 1.0)) ** 3
     labels = label_clusters(mobility > 0, (False, wrap))
     on_path = np.isin(labels, np.intersect1d(labels[0], labels[-1])) & (labels > 0)
-    cells, scale = np.flatnonzero(on_path), widest**3 / 12
+    cells = np.flatnonzero(on_path)
+    scale = widest**3 / 12
     if not cells.size:
         return Flow(0.0, 0.0, np.zeros(gap.shape), np.zeros(gap.shape))
     faces = _conductances(np.where(on_path, mobility, 0.0), spacing[1] / spacing[0], wrap)
@@ -193,7 +200,9 @@ def flow(gap: Array, spacing: tuple[float, float], *, wrap: bool = False) -> Flo
     inlet = np.zeros(faces.size)  # the pressure is 1 at the inlet, 0 at the outlet
     inlet[:ny] = 1.0
     matrix = (difference.T @ sparse.diags_array(faces) @ difference).tocsr()
-    pressure, conductance, error = np.zeros(cells.size), 0.0, np.inf
+    pressure = np.zeros(cells.size)
+    conductance = 0.0
+    error = np.inf
     for solve in _solvers(matrix, cells, ny):
         drop = inlet - difference @ pressure
         left = difference.T @ (faces * drop)
@@ -212,16 +221,19 @@ def flow(gap: Array, spacing: tuple[float, float], *, wrap: bool = False) -> Flo
             drop = inlet - difference @ np.nan_to_num(pressure)
             conductance = error = float(faces @ drop**2)
         else:
-            solve_exactly, drop = _elimination(faces, cells, (nx, ny)), inlet.copy()
+            solve_exactly = _elimination(faces, cells, (nx, ny))
+            drop = inlet.copy()
             for _ in range(_BY_ELIMINATION):
                 left = difference.T @ (faces * drop)
                 step = solve_exactly(left)
-                conductance, error = float(faces @ drop**2), abs(float(left @ step))
+                conductance = float(faces @ drop**2)
+                error = abs(float(left @ step))
                 drop -= difference @ step  # not from the pressures, whose differences lose digits in a basin
                 if max(error, float(abs(left).max())) <= _CLOSE * conductance:
                     break
     flux = scale * faces * drop
-    along, across = flux[: (nx + 1) * ny].reshape(nx + 1, ny), flux[(nx + 1) * ny :].reshape(nx, ny)
+    along = flux[: (nx + 1) * ny].reshape(nx + 1, ny)
+    across = flux[(nx + 1) * ny :].reshape(nx, ny)
     along, across = along[1:] + along[:-1], across + np.roll(across, 1, axis=1)
     return Flow(conductance * scale, error * scale, along / 2 / spacing[1], across / 2 / spacing[0])
 
@@ -246,7 +258,9 @@ def _conductances(mobility: Array, aspect: float, wrap: bool) -> Array:
     """
 
     def in_series(one: Array, other: Array) -> Array:
-        low, high = np.minimum(one, other), np.maximum(one, other)  # no product, which may underflow
+        # no product, which may underflow
+        low = np.minimum(one, other)
+        high = np.maximum(one, other)
         return 2 * low / (1 + np.divide(low, high, where=high > 0, out=np.zeros_like(low)))
 
     along = np.concatenate([2 * mobility[:1], in_series(mobility[:-1], mobility[1:]), 2 * mobility[-1:]])
@@ -287,8 +301,8 @@ def _factors(matrix: sparse.csr_array) -> Callable[[Array], Array]:
     scaling = sparse.diags_array(scale)
     # positive definite: no pivoting, and the ordering of symmetric matrices
     options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-    found = splu((scaling @ matrix @ scaling).tocsc(), **options)
-    return lambda source: scale * found.solve(scale * source)
+    factors = splu((scaling @ matrix @ scaling).tocsc(), **options)
+    return lambda source: scale * factors.solve(scale * source)
 
 
 def _elimination(faces: Array, cells: Numbers, shape: tuple[int, int]) -> Callable[[Array], Array]:
@@ -307,10 +321,13 @@ def _elimination(faces: Array, cells: Numbers, shape: tuple[int, int]) -> Callab
         Shape of the map.
     """
     nx, ny = shape
-    along, across = faces[: (nx + 1) * ny].reshape(nx + 1, ny), faces[(nx + 1) * ny :].reshape(nx, ny)
+    along = faces[: (nx + 1) * ny].reshape(nx + 1, ny)
+    across = faces[(nx + 1) * ny :].reshape(nx, ny)
     # The front: for each column, the first cell that is not eliminated yet. Its faces to the others and to both sides.
-    between, outside = np.zeros((ny, ny)), along[0].copy()
-    shares, totals = np.zeros((cells.size, ny)), np.zeros(cells.size)
+    between = np.zeros((ny, ny))
+    outside = along[0].copy()
+    shares = np.zeros((cells.size, ny))
+    totals = np.zeros(cells.size)
     number = np.full(nx * ny, -1)
     number[cells] = np.arange(cells.size)
 
@@ -328,7 +345,8 @@ def _elimination(faces: Array, cells: Numbers, shape: tuple[int, int]) -> Callab
     for column in range(ny):
         enter(0, column)
     for index, (row, column) in enumerate(np.ndindex(nx, ny)):
-        weights, own = between[column].copy(), outside[column]
+        weights = between[column].copy()
+        own = outside[column]
         weights[column] = along[row + 1, column] if row < nx - 1 else 0.0  # the next cell of the column takes the place
         between[column], between[:, column], outside[column] = 0.0, 0.0, 0.0
         total = float(weights.sum() + own)
@@ -342,8 +360,10 @@ def _elimination(faces: Array, cells: Numbers, shape: tuple[int, int]) -> Callab
     columns = cells % ny
 
     def solve(source: Array) -> Array:
-        received, pressure = source.copy(), np.zeros_like(source)
-        passed_on, front = np.zeros(ny), np.zeros(ny)
+        received = source.copy()
+        pressure = np.zeros_like(source)
+        passed_on = np.zeros(ny)
+        front = np.zeros(ny)
         for cell, column in enumerate(columns):
             received[cell] += passed_on[column]
             passed_on[column] = 0.0
@@ -382,13 +402,16 @@ def _solver_on_two_grids(
     weight = _RELAXATION / diagonal
 
     def precondition(left: Array) -> Array:
-        found = weight * left
-        found += prolongation @ on_coarse(restriction @ (left - matrix @ found))
-        return found + weight * (left - matrix @ found)
+        pressure = weight * left
+        pressure += prolongation @ on_coarse(restriction @ (left - matrix @ pressure))
+        return pressure + weight * (left - matrix @ pressure)
 
     def solve(enough: float, source: Array) -> Array | None:
-        pressure, left = np.zeros_like(source), source.copy()
-        direction, before, energy = np.zeros_like(source), 1.0, 0.0
+        pressure = np.zeros_like(source)
+        left = source.copy()
+        direction = np.zeros_like(source)
+        before = 1.0
+        energy = 0.0
         for _ in range(_MOST):
             better = precondition(left)
             product = float(left @ better)
@@ -410,7 +433,8 @@ def _solver_on_two_grids(
 
 def _prolongation(matrix: sparse.csr_array, cells: Numbers, width: int) -> sparse.csr_array:
     """Return the prolongation from coarse cells to cells; cells without a strong face belong to no coarse cell."""
-    diagonal, faces = matrix.diagonal(), sparse.triu(matrix, 1).tocoo()
+    diagonal = matrix.diagonal()
+    faces = sparse.triu(matrix, 1).tocoo()
     first, second = faces.coords
     strong = -faces.data > _STRONG * np.sqrt(diagonal[first] * diagonal[second])
     first, second = first[strong], second[strong]
@@ -482,8 +506,8 @@ def frozen_contact(
     finer, off, _ = _punch(split, (spacing[0] / 2, spacing[1] / 2), boundary, tolerance)
     difference = ends / (ends + opens) * max(finer - stiffness, 0.0)
     oblique = min(_staircase(rimmed) / _STEPS, 1.0)
-    part = _OBLIQUE + (_ALONG - _OBLIQUE) * (1 - oblique) ** 2
-    return stiffness + part * difference, error + part * off + _OFF * difference
+    share = _OBLIQUE + (_ALONG - _OBLIQUE) * (1 - oblique) ** 2
+    return stiffness + share * difference, error + share * off + _OFF * difference
 
 
 def _punch(

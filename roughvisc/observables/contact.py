@@ -205,7 +205,7 @@ def leakage(
             raise InputError(f"leakage: {found}: expected a surface that is cropped, or filled")
         return flow_through(field, sides_of_cell, wrap=wrap)[: len(outputs)]
 
-    outputs = [[], []] + [[along, across]] * (2 * flow)
+    outputs: list[list[str]] = [[], []] + [[along, across]] * (2 * flow)
     conductance, error, *fields = frame_by_frame(measure, gap, outputs=outputs, over=(along, across))
     transmissivity = conductance * (cells[along] * gap.sizes[along] / (cells[across] * gap.sizes[across]))
     drop = pressure_drop / viscosity
@@ -269,7 +269,8 @@ def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str]) -> xr.D
         raise InputError(key="resistivity", found=resistivity, expected="none below zero, and not both zero")
     touching = contact(dataset)
     present = dataset["height"].notnull() if "height" in dataset else xr.ones_like(touching)
-    cells, boundary = spacing(dataset, "spots"), boundary_of(dataset)
+    cells = spacing(dataset, "spots")
+    boundary: Any = boundary_of(dataset)
 
     def measure(touching: np.ndarray, present: np.ndarray) -> tuple[float, float]:
         return frozen_contact(touching, cells, boundary, present=present)

@@ -45,7 +45,8 @@ def expect_result(dataset: Any, *names: str) -> xr.Dataset:
         raise InputError(f"the result has no {axis}: expected at least one row")
     for name in names:
         if name in VARIABLES and set(dataset[name].dims) - {*VARIABLES[name].over(axis)}:  # by xarray's where, for one
-            found, expected = dataset[name].dims, f"dimensions {', '.join(VARIABLES[name].over(axis))}, as stored"
+            found = dataset[name].dims
+            expected = f"dimensions {', '.join(VARIABLES[name].over(axis))}, as stored"
             raise InputError(key=name, found=found, expected=expected)
     return dataset
 
@@ -157,8 +158,8 @@ def cycle_work(dataset: xr.Dataset) -> xr.Dataset:
     is_row = np.abs(ends[:, None] - rows).min(axis=1) <= _SAME * np.tile(period, 2)
     steps = dataset if is_row.all() else require_steps(dataset)  # the work at a row includes all steps before it
     work = np.interp(ends, steps["time"], steps["work"])
-    found = xr.Dataset(
+    cycle_values = xr.Dataset(
         {"cycle_start": ("cycle", begin), "cycle_work": ("cycle", work[begin.size :] - work[: begin.size])},
         coords={"cycle": np.arange(begin.size) + 1},
     )
-    return label(found)
+    return label(cycle_values)

@@ -85,13 +85,16 @@ def area_by_theory(dataset: xr.Dataset, material: Material) -> xr.Dataset:
     """
     dataset = expect_result(dataset, "force", "height")
     if dataset.attrs.get("boundary") not in ("periodic", "mirror"):
-        found = dataset.attrs.get("boundary")
-        raise InputError(key="boundary", found=found, expected="'periodic' or 'mirror', as the theories assume")
+        boundary = dataset.attrs.get("boundary")
+        raise InputError(key="boundary", found=boundary, expected="'periodic' or 'mirror', as the theories assume")
     if (body := dataset.attrs.get("body", HALF_SPACE.text)) != HALF_SPACE.text:
         raise InputError(key="body", found=body, expected=f"a result on a {HALF_SPACE.text}, as the theories assume")
     material = check_material(material)
-    steps, kept = history(dataset), dataset["time"].values
-    area, times, force = nominal_area(dataset), steps["time"].values, steps["force"].values
+    steps = history(dataset)
+    kept = dataset["time"].values
+    area = nominal_area(dataset)
+    times = steps["time"].values
+    force = steps["force"].values
     # int C(t - s) dp(s) for a pressure that is linear between the steps
     since = np.maximum(kept[:, None] - times[None], 0.0)
     integral = material.contact_integral(since)
@@ -101,11 +104,11 @@ def area_by_theory(dataset: xr.Dataset, material: Material) -> xr.Dataset:
     last = times[int(np.argmax(falling))] if falling.any() else math.inf
     slope = rms_slope(dataset["height"], periodic=dataset.attrs["boundary"] == "periodic")
     strain = np.where(kept <= last, strain / slope, np.nan)
-    found = {
+    areas = {
         "persson_contact_area": ("time", area * persson_fraction(strain)),
         "asperity_contact_area": ("time", area * asperity_fraction(strain)),
     }
-    return label(xr.Dataset(found, coords={"time": dataset["time"]}))
+    return label(xr.Dataset(areas, coords={"time": dataset["time"]}))
 
 
 def persson(dataset: xr.Dataset, material: Material | Body) -> xr.Dataset:
@@ -138,12 +141,12 @@ def persson(dataset: xr.Dataset, material: Material | Body) -> xr.Dataset:
     body = material if isinstance(material, Body) else Body(material)
     height = dataset["height"]
     grid = SlidingGrid.of(-height.values, spacing(height, "height"), dataset.attrs["direction"])
-    found = []
+    waves = []
     for speed, pressure in zip(dataset["speed"].values, dataset["nominal_pressure"].values, strict=True):
         sliding = Sliding(grid.law(body, float(speed), _TOLERANCE), grid.gap.shape, grid.spacing, float(speed))
-        found.append(friction_of_waves(sliding, grid.gap, float(pressure)))
+        waves.append(friction_of_waves(sliding, grid.gap, float(pressure)))
     names = "persson_friction_coefficient", "persson_contact_fraction"
-    columns = {name: ("speed", column) for name, column in zip(names, np.transpose(found), strict=True)}
+    columns = {name: ("speed", column) for name, column in zip(names, np.transpose(waves), strict=True)}
     return label(xr.Dataset(columns, coords={"speed": dataset["speed"]}))
 
 

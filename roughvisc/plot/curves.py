@@ -14,21 +14,16 @@ from matplotlib.figure import Figure
 from roughvisc.arguments import listed_names, one_of
 from roughvisc.errors import InputError
 from roughvisc.judge.trade import format_tolerance, pareto_front, uncertainty
-from roughvisc.labels import steps_of
+from roughvisc.labels import error_of, steps_of
 from roughvisc.observables.history import expect_result
 from roughvisc.observables.theory import asperity_fraction, persson_fraction
 from roughvisc.plot import style
 from roughvisc.topography.grid import nominal_area, rms_slope
 from roughvisc.units import Unit, quantities, unit_for
-from roughvisc.variables import AXES, GRID_ERROR, VARIABLES, axis_of
+from roughvisc.variables import AXES, VARIABLES, axis_of
 
-#: Quantities that are drawn if the result holds them.
-_QUANTITIES = (
-    *("force", "approach", "contact_area", "mean_gap", "work", "friction_coefficient"),
-    *("leak_rate", "thermal_conductance", "electrical_conductance"),
-)
-#: Quantity -> its relative error by the grid.
-_GRID_ERROR = GRID_ERROR | {"contact_fraction": "grid_error_area", "friction_coefficient": "grid_error_friction"}
+#: Least error, over the largest value, that a figure shows.
+_VISIBLE = 0.01
 #: Largest number of rows for which dots are drawn.
 _DOTS = 40
 
@@ -37,9 +32,9 @@ _DOTS = 40
 def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, *, over: str | None = None) -> Figure:
     """Draw quantities over time, over the distance slid, over the speed, or over each other.
 
-    Lines pass through every time step, dots mark the kept times, and bands show the error of the grid, if it is in the
-    result. A result that has lost the history of its steps has dots alone. The axis is logarithmic if the largest value
-    exceeds thirty times the smallest.
+    Lines pass through every time step, dots mark the kept times, and bands show the stated error, with the error of the
+    grid if that is in the result, unless all of it is below 1 % of the largest value. A result that has lost the
+    history of its steps has dots alone. The axis is logarithmic if the largest value exceeds thirty times the smallest.
 
     Parameters
     ----------
@@ -65,7 +60,9 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
     dataset = expect_result(dataset)
     axis = axis_of(dataset.variables)
     over = over or axis
-    default = ("friction_coefficient", "contact_area") if over == "sliding_distance" else _QUANTITIES
+    default = [name for name, variable in VARIABLES.items() if variable.is_panel]
+    if over == "sliding_distance":
+        default = ["friction_coefficient", "contact_area"]
     wanted = [name for name in default if name in dataset] if quantities is None else quantities
     names = listed_names(wanted)
     expect_result(dataset, over, *(names or default))
@@ -83,7 +80,7 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
 
 
 def _draw_history(ax: Axes, name: str, steps: xr.Dataset | None, kept: xr.Dataset, over: str, across: Unit) -> None:
-    """Draw a quantity as a line through the steps and dots at the kept rows, with the theory and the error of the grid.
+    """Draw a quantity as a line through the steps and dots at the kept rows, with the theory and the stated error.
 
     Parameters
     ----------
@@ -107,10 +104,11 @@ def _draw_history(ax: Axes, name: str, steps: xr.Dataset | None, kept: xr.Datase
     if values.size <= _DOTS or steps is None:
         label_of_dots = "kept times" if is_finer or steps is None else None
         ax.plot(at, unit(values), "o", color=colour, label=label_of_dots)
-    error = _GRID_ERROR.get(name, "")
-    if name != "force" and error in kept and kept[error].notnull().any():
-        ends = (unit(values * (1 + sign * kept[error])) for sign in (-1, 1))
-        ax.fill_between(at, *ends, color=colour, alpha=0.18, lw=0, label="error of the grid")
+    error = error_of(kept, name)
+    if error is not None and float(error.max()) > _VISIBLE * float(abs(values).max()):
+        ax.fill_between(
+            at, unit(values - error), unit(values + error), color=colour, alpha=0.18, lw=0, label="stated error"
+        )
     if f"persson_{name}" in kept:
         ax.plot(at, unit(kept[f"persson_{name}"]), "--", color="k", lw=0.9, label="Persson")
     style.value_axis(ax, np.concatenate([one.get_ydata() for one in ax.lines]), unit)
@@ -184,7 +182,7 @@ def area_against_load(results: xr.Dataset | Mapping[str, xr.Dataset], *, contact
 def friction(dataset: xr.Dataset) -> Figure:
     """Draw friction coefficient and contact fraction against the logarithm of the speed.
 
-    Bands show the error of the grid, if it is in the result. Speeds without a solution are missing.
+    Bands show the stated error, as in :func:`history`. Speeds without a solution are missing.
 
     Parameters
     ----------

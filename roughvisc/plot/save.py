@@ -32,7 +32,7 @@ from roughvisc.study.case_text import file_stems
 #: Name -> function of a result, variables that it needs, and a caption.
 FIGURES: dict[str, tuple[Callable[[xr.Dataset], Figure], tuple[str, ...], str]] = {
     "friction": (friction, ("speed", "friction_coefficient"), "Friction coefficient and contact fraction."),
-    "history": (history, ("time", "force", "approach"), "Histories. Dots: kept times; bands: error of the grid."),
+    "history": (history, ("time", "force", "approach"), "Histories. Dots: kept times; bands: stated error."),
     "maps": (maps, ("x", "y", "pressure"), "Pressure and gap between the bodies."),
     "leakage": (partial(maps, fields="flux"), ("leak_rate", "gap", "x"), "Flux of the fluid, integrated over the gap."),
     "section": (section, ("height", "pressure", "gap"), "Section through the contact at its largest area."),

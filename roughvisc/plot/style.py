@@ -39,7 +39,14 @@ apply = matplotlib.rc_context(STYLE)
 
 
 def new_panels(
-    count: int, columns: int, size: tuple[float, float], *, shared: str = "", lines: int = 1, **room: float
+    count: int,
+    columns: int,
+    size: tuple[float, float],
+    *,
+    shared: str = "",
+    lines: int = 1,
+    projection: str | None = None,
+    **room: float,
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure, independent of windows and of matplotlib's global state, and its panels in rows of some columns.
 
@@ -55,6 +62,8 @@ def new_panels(
         Axes that all panels share: ``"x"``, ``"y"`` or ``"xy"``; only the outer panels have their labels.
     lines : int
         Number of lines of the titles of the panels.
+    projection : str, optional
+        Kind of axes of matplotlib, such as ``"polar"``. Default: rectangular.
     **room : float
         Margins ``left``, ``right`` and ``bottom`` of the panels, and ``between`` two columns. [inch]
     """
@@ -64,7 +73,9 @@ def new_panels(
     wide = left + columns * width + (columns - 1) * across + right
     high = bottom + rows * height + (rows - 1) * up + title
     figure = Figure(figsize=(wide, high))
-    grid = figure.subplots(rows, columns, sharex="x" in shared, sharey="y" in shared, squeeze=False)
+    grid = figure.subplots(
+        rows, columns, sharex="x" in shared, sharey="y" in shared, squeeze=False, subplot_kw={"projection": projection}
+    )
     figure.subplots_adjust(left / wide, bottom / high, 1 - right / wide, 1 - title / high, across / width, up / height)
     for unused in grid.flat[count:]:
         unused.remove()

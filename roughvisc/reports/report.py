@@ -33,7 +33,7 @@ from roughvisc.study.case_text import case_words, study_text
 from roughvisc.topography.filters import off_plane
 from roughvisc.topography.parameters import parameters
 from roughvisc.units import unit_for
-from roughvisc.variables import AXES, IN_TABLE, VARIABLES, axis_of
+from roughvisc.variables import AXES, VARIABLES, axis_of, in_table
 
 #: Largest number of cases with figures, audit and study, which are evenly spread.
 _SHOWN = 6
@@ -143,7 +143,7 @@ def _cells(dataset: xr.Dataset) -> dict[str, str]:
     axis = AXES[axis_of(dataset)]
     telling = dataset.isel({axis.name: axis.telling_row(dataset)})
     cells = {"Grid": f"{dataset.sizes['x']} × {dataset.sizes['y']}"}
-    cells |= {VARIABLES[name].label: _text(telling[name]) for name in IN_TABLE if name in telling}
+    cells |= {variable.label: _text(telling[name]) for name, variable in in_table("value").items() if name in telling}
     if "stated_error" in dataset and dataset["stated_error"].notnull().any():
         worst, tolerance = float(dataset["stated_error"].max()), dataset.attrs.get("tolerance", np.inf)
         above = f", above the tolerance of {tolerance:g}" if worst > tolerance else ""

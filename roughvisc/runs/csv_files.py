@@ -18,7 +18,7 @@ from roughvisc.runs.folder import atomic_write, no_results, recorded_failure
 from roughvisc.runs.sweep_data import index_of, numbers_of, read_sweep
 from roughvisc.study.case import parameters_of
 from roughvisc.study.study_file import unit_of
-from roughvisc.variables import AXES, ERRORS, GRID_ERROR, IN_TABLE, LARGEST_IN_TABLE, VARIABLES, axis_of
+from roughvisc.variables import AXES, VARIABLES, axis_of, in_table
 
 log = logging.getLogger("roughvisc")
 
@@ -60,19 +60,20 @@ def to_table(out: str | Path) -> pd.DataFrame:
     cases = cases or {key: entry.case for key, entry in index.items()}
     stated, numbers, ends = [*cases.values()], [], []
     for key in cases:
-        found, status, message, entry = {}, "not computed", "", index.get(key)
+        values: dict[str, float] = {}
+        status, message, entry = "not computed", "", index.get(key)
         if entry is not None:
             status = "converged"
             row = AXES[entry.along].telling_row(entry.arrays)
-            for name in chain.from_iterable((name, *ERRORS[name]) for name in IN_TABLE):
-                if name not in GRID_ERROR.values() and len(entry.arrays.get(name, ())):
-                    found[heading(name, VARIABLES[name].units)] = float(entry.arrays[name][row])
-            for name in LARGEST_IN_TABLE:
+            for name in chain.from_iterable((name, variable.error) for name, variable in in_table("value").items()):
+                if len(entry.arrays.get(name, ())):
+                    values[heading(name, VARIABLES[name].units)] = float(entry.arrays[name][row])
+            for name, variable in in_table("largest").items():
                 known = filter(np.isfinite, entry.arrays.get(name, ()))
-                found[f"largest {heading(name, VARIABLES[name].units)}"] = max(known, default=np.nan)
+                values[f"largest {heading(name, variable.units)}"] = max(known, default=np.nan)
         elif record := recorded_failure(folder, key):
             status, message = "failed", str(record.get("message", ""))
-        numbers.append(found)
+        numbers.append(values)
         ends.append({"status": status, "message": " ".join(message.split()), "file": entry.file if entry else ""})
     table = pd.DataFrame({"title": [str(case.get("title", "")) for case in stated]})
     for key, values in parameters_of(stated).items():

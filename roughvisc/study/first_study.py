@@ -28,10 +28,13 @@ RUBBER = zener(shear_modulus=3e6, kelvin_modulus=1e6, kelvin_viscosity=1e5)
 #: Final contact fraction, unless another is requested.
 CONTACT = 0.05
 #: Largest number of cells along the longer side for a press, and tolerance of the pressure.
-MOST_PRESSED, _TOLERANCE = 256, 1e-2
+MOST_PRESSED = 256
+_TOLERANCE = 1e-2
 #: Largest number of presses, accepted relative error of the contact, and largest factor between the pressure and the
 #: pressure of a theory: a surface with plateaus has more contact than in theory under any pressure.
-_PRESSES, _NEAR, _FARTHEST = 12, 0.01, 100.0
+_PRESSES = 12
+_NEAR = 0.01
+_FARTHEST = 100.0
 #: Largest relative difference between contact and requested contact without a warning.
 _MISSED = 0.2
 #: Pressure on a flat scan. [Pa]
@@ -103,8 +106,10 @@ def first_pressure(scan: xr.DataArray, found: Inspection, contact: float = CONTA
     factor = max(few.shape) / MOST_PRESSED
     few = few if factor <= 1 else coarser(few, factor, "free")
     profile = Profile(few, "absent")
-    grid, present = Grid(profile.gap.shape, profile.spacing, found.boundary), profile.present
-    compliance, slope = float(RUBBER.contact_compliance(math.inf)), found.rms_slope
+    grid = Grid(profile.gap.shape, profile.spacing, found.boundary)
+    present = profile.present
+    compliance = float(RUBBER.contact_compliance(math.inf))
+    slope = found.rms_slope
     share = rms_slope(few) / slope if slope > 0 else 1.0
 
     def touching(pressure: float) -> float:

@@ -144,12 +144,12 @@ def _export(description: Mapping[str, Any], table: Mapping[str, Any]) -> Export:
         if (key in _IF_STATED and key not in names) or (key == "loss" and "tan_delta" in names):
             continue
         wanted[key] = Wanted(names.get(key, key), unit, optional=key in _IF_THERE and key not in names)
-    unit = table.get("frequency_unit")
-    if unit is not None and "frequency" in wanted:
-        one_of("frequency_unit", unit, FREQUENCY_UNITS)
+    stated_unit = table.get("frequency_unit")
+    if stated_unit is not None and "frequency" in wanted:
+        one_of("frequency_unit", stated_unit, FREQUENCY_UNITS)
         named = wanted["frequency"]
         if "[" not in named.name and "(" not in named.name:
-            wanted["frequency"] = named._replace(name=f"{named.name} [{unit}]")
+            wanted["frequency"] = named._replace(name=f"{named.name} [{stated_unit}]")
     return read_export(description["file"], wanted, part)
 
 

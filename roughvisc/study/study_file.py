@@ -83,7 +83,14 @@ _ROUNDING = 1e-12
 # ----------------------------------------------------------------------------------------------------------------
 # units
 
-_TAKING = (open_scan, combine, *RECIPES.values(), *(step.function for step in STEPS.values()), *MODELS.values(), wlf)
+_TAKING: tuple[Callable[..., Any], ...] = (
+    open_scan,
+    combine,
+    *RECIPES.values(),
+    *(step.function for step in STEPS.values()),
+    *MODELS.values(),
+    wlf,
+)
 _TAKING += (arrhenius, sheet, SteadySliding, Settings, *OBSERVABLES.values(), properties)
 #: Unit of each key, from the functions that take the arguments; ``"1"`` for a pure number.
 _UNITS = {name: unit for function in _TAKING for name, unit in units_of(function).items()}
@@ -242,7 +249,7 @@ def speeds_of(where: str, stated: Any) -> list[float]:
         return sorted({number(one, "m/s", where) for one in listed})
     refuse_unknown(where, stated, ("from", "to", "count"))
     first, last = (number(stated.get(key), "m/s", f"{where}.{key}", above=0) for key in ("from", "to"))
-    count = stated.get("count")
+    count: Any = stated.get("count")
     if not suits(count, int) or not 2 <= count <= _MOST_SPEEDS:
         raise InputError(key=f"{where}.count", found=count, expected=f"a whole number from 2 to {_MOST_SPEEDS}")
     if not first < last:

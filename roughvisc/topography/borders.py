@@ -43,7 +43,8 @@ def border_mismatch(h: xr.DataArray) -> tuple[float, float]:
 
 def period_of(h: xr.DataArray) -> list[float]:
     """Return the sides of a grid, which the attribute ``period`` of a periodic surface records. [m]"""
-    (nx, ny), (dx, dy) = h.shape, spacing(h)
+    nx, ny = h.shape
+    dx, dy = spacing(h)
     return [nx * dx, ny * dy]
 
 

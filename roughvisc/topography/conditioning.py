@@ -79,7 +79,8 @@ def condition(h: xr.DataArray, steps: Mapping[str, Any], where: str = "") -> xr.
     """
     refuse_unknown(where, a_table(where or "conditioning", steps), STEPS)
     for name, step in STEPS.items():
-        value, key = steps.get(name, False), dotted(where, name)
+        value = steps.get(name, False)
+        key = dotted(where, name)
         if value is False:
             continue
         table = value if isinstance(value, Mapping) else {}

@@ -230,8 +230,10 @@ def gaussian_filter(h: xr.DataArray, cutoff: Quantity, keep: Literal["long", "sh
     longest = max(side * count for side, count in zip(sides, h.shape, strict=True))
     cutoff = number(cutoff, "m", "cutoff", least=3 * max(sides) * (1 - _ROUNDING), most=longest * (1 + _ROUNDING))
     require_heights(h, "gaussian_filter")
-    mean, present = np.nanmean(h.values), np.isfinite(h.values)
-    long, share = np.where(present, h.values - mean, 0.0), present.astype(float)
+    mean = np.nanmean(h.values)
+    present = np.isfinite(h.values)
+    long = np.where(present, h.values - mean, 0.0)
+    share = present.astype(float)
     for axis, side in enumerate(sides):
         long, share = (_smoothed(field, axis, cutoff / side) for field in (long, share))
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -272,8 +274,8 @@ def _smoothed(field: np.ndarray, axis: int, cutoff: float) -> np.ndarray:
     """Apply a Gaussian filter along one axis (cut-off in cells), without normalisation at the border."""
     count = field.shape[axis]  # zeros beyond the border, as far as the weights reach
     length = scipy.fft.next_fast_len(count + min(math.ceil(1.5 * cutoff), count), real=True)
-    at = np.minimum(np.arange(length), length - np.arange(length))
-    weights = np.exp(-np.pi * (at / (math.sqrt(math.log(2) / math.pi) * cutoff)) ** 2)
+    distance = np.minimum(np.arange(length), length - np.arange(length))
+    weights = np.exp(-np.pi * (distance / (math.sqrt(math.log(2) / math.pi) * cutoff)) ** 2)
     transmission = scipy.fft.rfft(weights / weights.sum())
     field_q = scipy.fft.rfft(field, length, axis=axis)
     field_q *= transmission[:, None] if axis == 0 else transmission

@@ -153,7 +153,8 @@ def combine(
     apart = _two_lengths("offset", offset)
     h1, h2 = checked(h1, "combine"), checked(h2, "combine")
     repeats = is_periodic(h1) and is_periodic(h2) and np.allclose(period_of(h1), period_of(h2), rtol=1e-6, atol=0)
-    sha, about = h2.attrs.get("source_sha256"), "; ".join(str(h2.attrs.get("history", "")).splitlines())
+    sha = h2.attrs.get("source_sha256")
+    about = "; ".join(str(h2.attrs.get("history", "")).splitlines())
     line = f"combined with {h2.attrs.get('source_file', 'a second face')}" + (f" (SHA-256 {sha})" if sha else "")
     if flip is not None:  # reverse heights; the coordinate stays
         h2 = h2.isel({flip: slice(None, None, -1)}).assign_coords({flip: h2[flip]})
@@ -194,13 +195,17 @@ def _on_common_cells(h1: xr.DataArray, h2: xr.DataArray, apart: tuple[float, flo
     """
     from scipy.interpolate import RectBivariateSpline  # slow to import
 
-    sides1, sides2 = spacing(h1), spacing(h2)
+    sides1 = spacing(h1)
+    sides2 = spacing(h2)
     shape = [min(n, max(2, round(n * d2 / d1))) for n, d1, d2 in zip(h2.shape, sides1, sides2, strict=True)]
     if tuple(shape) != h2.shape:
         h2 = resample(h2, (shape[0], shape[1]))
-    kept, at = {}, []
+    kept = {}
+    offsets = []
     for axis, d1, d2, by in zip(("x", "y"), sides1, spacing(h2), apart, strict=True):
-        n1, n2, side = h1.sizes[axis], h2.sizes[axis], d1 / d2
+        n1 = h1.sizes[axis]
+        n2 = h2.sizes[axis]
+        side = d1 / d2
         lower = ((np.arange(n1) - n1 / 2) * d1 - by) / d2 + n2 / 2  # borders of the first, in cells of the second
         covered = (lower >= -_ON_BORDER) & (lower + side <= n2 + _ON_BORDER)
         if covered.sum() < 2:
@@ -210,15 +215,15 @@ def _on_common_cells(h1: xr.DataArray, h2: xr.DataArray, apart: tuple[float, flo
                 f"{' and '.join(lengths)} long, the centres {apart_by} apart: expected at least two cells"
             )
         kept[axis] = covered
-        at.append(np.clip(lower[covered] + side / 2 - 0.5, 0, n2 - 1))  # new centres, in numbers of old cells
+        offsets.append(np.clip(lower[covered] + side / 2 - 0.5, 0, n2 - 1))  # new centres, in numbers of old cells
 
-    nodes = [np.round(places).astype(int) for places in at]
-    if all(np.abs(places - node).max() <= _ON_BORDER for places, node in zip(at, nodes, strict=True)):
+    nodes = [np.round(places).astype(int) for places in offsets]
+    if all(np.abs(places - node).max() <= _ON_BORDER for places, node in zip(offsets, nodes, strict=True)):
         return h1.isel(kept), h2.values[np.ix_(*nodes)]  # the cells of both faces coincide: no rounding by a spline
 
     def laid(values: np.ndarray, order: int) -> np.ndarray:
         degrees = [min(order, n - 1) for n in values.shape]
-        return RectBivariateSpline(*map(np.arange, values.shape), values, kx=degrees[0], ky=degrees[1])(*at)
+        return RectBivariateSpline(*map(np.arange, values.shape), values, kx=degrees[0], ky=degrees[1])(*offsets)
 
     second = laid(membrane(h2.values), 3)
     second[laid(np.isnan(h2.values).astype(float), 1) > 0.5 + _ON_BORDER] = np.nan
@@ -251,5 +256,5 @@ def mirror(h: xr.DataArray) -> xr.DataArray:
     """
     h = checked(h, "mirror")
     axes = [float(h[axis][0]) + np.arange(2 * h.sizes[axis]) * d for axis, d in zip("xy", spacing(h), strict=True)]
-    doubled = with_coordinates(np.pad(h.values, [(0, n) for n in h.shape], mode="symmetric"), *axes, h.attrs)
+    doubled = with_coordinates(np.pad(h.values, [(0, n) for n in h.shape], mode="symmetric"), axes[0], axes[1], h.attrs)
     return noted(doubled, MIRRORED, period=period_of(doubled))

@@ -37,7 +37,8 @@ def labelled(heights: Any, spacing: tuple[float, float], attrs: dict[str, Any] |
         Attributes in addition to units and names.
     """
     values = np.asarray(heights, dtype=float)
-    (nx, ny), (dx, dy) = values.shape, spacing
+    nx, ny = values.shape
+    dx, dy = spacing
     return with_coordinates(values, (np.arange(nx) + 0.5) * dx, (np.arange(ny) + 0.5) * dy, attrs)
 
 
@@ -95,9 +96,9 @@ def checked(h: Any, step: str, least: int = 2) -> xr.DataArray:
     for axis in ("x", "y"):
         if h.sizes[axis] < least:
             raise InputError(f"{step}: coordinate {axis!r} has {h.sizes[axis]} point(s): expected at least {least}")
-        at = h[axis]
-        if at.dtype != float or at.attrs.get("units") != "m":
-            centres[axis] = axis, in_metres(at, f"{step}: coordinate {axis!r}"), at.attrs | {"units": "m"}
+        centre = h[axis]
+        if centre.dtype != float or centre.attrs.get("units") != "m":
+            centres[axis] = axis, in_metres(centre, f"{step}: coordinate {axis!r}"), centre.attrs | {"units": "m"}
     return h.assign_coords(centres)
 
 
@@ -116,18 +117,20 @@ def in_metres(numbers: Any, name: str) -> np.ndarray:
     InputError
         If they are not real numbers or held by pint, or their unit is not a length.
     """
-    unit, held = "m", numbers
+    unit = "m"
+    raw = numbers
     if isinstance(numbers, xr.DataArray):
-        unit, held = str(numbers.attrs.get("units", "m")), numbers.data
-    if hasattr(held, "magnitude"):  # NumPy would drop its unit
+        unit = str(numbers.attrs.get("units", "m"))
+        raw = numbers.data
+    if hasattr(raw, "magnitude"):  # NumPy would drop its unit
         raise InputError(f"{name} is a pint array: expected plain numbers [m]")
     try:
-        held = held if isinstance(held, np.ma.MaskedArray) else np.asarray(held)
+        raw = raw if isinstance(raw, np.ma.MaskedArray) else np.asarray(raw)
     except ValueError as error:  # rows of different lengths
         raise InputError(f"{name} is {type(numbers).__name__}: expected real numbers, as many in each row") from error
-    if held.dtype.kind not in "fiu":
-        raise InputError(f"{name} is of {held.dtype}: expected real numbers")
-    values = np.ma.filled(held.astype(float, copy=False), np.nan)
+    if raw.dtype.kind not in "fiu":
+        raise InputError(f"{name} is of {raw.dtype}: expected real numbers")
+    values = np.ma.filled(raw.astype(float, copy=False), np.nan)
     return values if unit == "m" else values * number(f"1 {unit}", "m", name)
 
 
@@ -159,11 +162,17 @@ def spacing(h: xr.DataArray | xr.Dataset, step: str = "spacing") -> tuple[float,
         if axis not in h.coords:
             raise InputError(f"{step}: the grid has no coordinate {axis!r}: expected cell centres in metres")
         name = f"{step}: coordinate {axis!r}"
-        at, side = in_metres(h[axis], name), 0.0
-        if at.ndim == 1 and at.size and np.isfinite(at).all():
-            side = float(f"{(at[-1] - at[0]) / (at.size - 1):.15g}") if at.size > 1 else 2 * float(at[0])
-        if not (side > 0 and (np.abs(np.diff(at) - side) <= 1e-4 * side).all()):
-            found = f"{at.size} centres of {at.dtype}, like {at.ravel()[:3]}, not finite and in equal, ascending steps"
+        centres = in_metres(h[axis], name)
+        side = 0.0
+        if centres.ndim == 1 and centres.size and np.isfinite(centres).all():
+            side = (
+                float(f"{(centres[-1] - centres[0]) / (centres.size - 1):.15g}")
+                if centres.size > 1
+                else 2 * float(centres[0])
+            )
+        if not (side > 0 and (np.abs(np.diff(centres) - side) <= 1e-4 * side).all()):
+            found = f"{centres.size} centres of {centres.dtype}, like {centres.ravel()[:3]}, "
+            found += "not finite and in equal, ascending steps"
             expected = "a uniform, ascending grid, or half the side of a single cell"
             raise InputError(f"{name} has {found}: expected {expected}")
         sides.append(side)
@@ -219,14 +228,17 @@ def squared_slopes(h: xr.DataArray, periodic: bool = False, depth: float = math.
     ndarray, shape (corners,)
         A single NaN if no corner counts.
     """
-    (dx, dy), (nx, ny) = spacing(h), h.shape
+    dx, dy = spacing(h)
+    nx, ny = h.shape
     beyond = (0, int(periodic or nx == 1)), (0, int(periodic or ny == 1))  # a strip one cell wide repeats too
     z = np.pad(h.values, beyond, mode="wrap")
-    along_x, along_y = (np.diff(z, axis=0) / dx) ** 2, (np.diff(z, axis=1) / dy) ** 2
+    along_x = (np.diff(z, axis=0) / dx) ** 2
+    along_y = (np.diff(z, axis=1) / dy) ** 2
     sides = slice(None, -1), slice(1, None)
-    at_x = at_y = lowest = None
+    lowest = None
     if depth < math.inf:
-        at_x, at_y = np.maximum(z[1:], z[:-1]), np.maximum(z[:, 1:], z[:, :-1])
+        at_x = np.maximum(z[1:], z[:-1])
+        at_y = np.maximum(z[:, 1:], z[:, :-1])
         lowest = np.nanmax(h.values) - depth
     corners = []
     for i, j in product(sides, sides):  # one after the other: together they take the memory of many fields
@@ -279,8 +291,8 @@ def pair(name: str, value: Any) -> tuple[float, float]:
 def counts(name: str, value: Any, low: int = 2) -> tuple[int, int]:
     """Return two whole numbers of cells; one number counts for both axes."""
     both = _both(value)
-    whole = len(both) == 2 and all(isinstance(n, Integral) and not isinstance(n, bool) and n >= low for n in both)
-    if not whole or both[0] * both[1] > MOST_CELLS:
+    whole = len(both) == 2 and all(isinstance(n, Integral) and not isinstance(n, bool) for n in both)
+    if not whole or min(both) < low or both[0] * both[1] > MOST_CELLS:
         expected = f"one or two whole numbers of cells of at least {low}, at most {MOST_CELLS:.3g} cells in all"
         raise InputError(key=name, found=value, expected=expected)
     return int(both[0]), int(both[1])

@@ -118,19 +118,20 @@ def inspect(h: xr.DataArray) -> Inspection:
     h = checked(h, "inspect")
     findings: dict[str, Finding] = {}
     missing, holes = int(h.isnull().sum()), in_large_holes(np.isnan(h.values))
-    seen, advice, step = f"{missing} ({_percent(missing / h.size)})", list[str](), dict[str, Any]()
+    seen, advices, step = f"{missing} ({_percent(missing / h.size)})", list[str](), dict[str, Any]()
     has_holes = bool(holes.mean() > _HOLES)
     if has_holes and (part := _clear_part(h, holes)):
-        h, step["crop"] = crop(h, **part), part
+        h = crop(h, x=part.get("x"), y=part.get("y"))
+        step["crop"] = part
         limits = [f"{axis} from {_length(low)} to {_length(high)}" for axis, (low, high) in part.items()]
-        advice.append(f"crop to the largest part without these holes, {' and '.join(limits)}")
+        advices.append(f"crop to the largest part without these holes, {' and '.join(limits)}")
     if gaps := int(h.isnull().sum()):
         step["fill"] = True
-        advice.append("fill = true; the result marks the filled points")
+        advices.append("fill = true; the result marks the filled points")
     if has_holes:
         seen += f", {_percent(holes.mean())} of the scan in holes wider than a few points"
-        advice.append('if there is no material in the holes, missing = "absent" instead')
-    findings["Missing points"] = Finding(seen, "; ".join(advice), step, {"points": missing})
+        advices.append('if there is no material in the holes, missing = "absent" instead')
+    findings["Missing points"] = Finding(seen, "; ".join(advices), step, {"points": missing})
 
     levelled = level(h)
     masked = mask_outliers(levelled)
@@ -177,7 +178,7 @@ def inspect(h: xr.DataArray) -> Inspection:
     return Inspection(findings, steps, boundary, nominal_area(treated), slope)
 
 
-def _clear_part(h: xr.DataArray, holes: np.ndarray) -> dict[str, list[float]]:
+def _clear_part(h: xr.DataArray, holes: np.ndarray) -> dict[str, Any]:
     """Return limits of the largest rectangle without large holes, as for :func:`roughvisc.crop`. [m]
 
     Empty if the rectangle is smaller than a tenth of the scan or than 16 points. The limits lie between two points, on
@@ -191,8 +192,8 @@ def _clear_part(h: xr.DataArray, holes: np.ndarray) -> dict[str, list[float]]:
         Points in large holes.
     """
     side = math.ceil(max(h.shape) / _BLOCKS)  # points along the side of a block
-    blocks = np.pad(holes, [(0, -n % side) for n in h.shape])
-    blocks = blocks.reshape(blocks.shape[0] // side, side, -1, side).any(axis=(1, 3))
+    padded = np.pad(holes, [(0, -n % side) for n in h.shape])
+    blocks = np.any(padded.reshape(padded.shape[0] // side, side, -1, side), axis=(1, 3))
     clear_below, largest = np.zeros(blocks.shape[1], dtype=int), (0, (0, 0), (0, 0))
     for row, has_hole in enumerate(blocks):
         clear_below = np.where(has_hole, 0, clear_below + 1)  # clear blocks in each column, up to this row

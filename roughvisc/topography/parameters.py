@@ -56,7 +56,8 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
     h = checked(h, "parameters", least=1)
     require_heights(h, "parameters")
     known = h.values[np.isfinite(h.values)]
-    z, gradient = known - known.mean(), squared_slopes(h, periodic)
+    z = known - known.mean()
+    gradient = squared_slopes(h, periodic)
     square = (z**2).mean()
     with np.errstate(invalid="ignore", divide="ignore"):
         values = {

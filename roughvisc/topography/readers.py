@@ -64,7 +64,12 @@ def read_file(path: Path, given: Mapping[str, Any]) -> xr.DataArray:
         h = _labelled(file, channel, given)
     for complaint in file.complaints:
         warnings.warn(f"{path}: {complaint}", UserWarning, stacklevel=5)
-    attrs = {"source_file": path.name, "source_sha256": sha256(path), "format": file.format, "channel": channel.name}
+    attrs: dict[str, Any] = {
+        "source_file": path.name,
+        "source_sha256": sha256(path),
+        "format": file.format,
+        "channel": channel.name,
+    }
     attrs["other_channels"] = ", ".join(other.name for other in file.channels if other is not channel) or None
     stated = "".join(f", {key} {value} as given" for key, value in given.items() if key not in attrs)
     line = f"read {path.name} ({file.format}), channel {channel.name!r}{stated}"
@@ -78,7 +83,8 @@ def _labelled(file: ScanFile, channel: Channel, given: Mapping[str, Any]) -> xr.
     spacing = pair("spacing", given["spacing"]) if "spacing" in given else None
     if grid is not None and (channel.kind != "points" or spacing is not None):
         raise InputError(key="grid", found=grid, expected="none for a map, or with a spacing")
-    raw, sides = channel.load(), channel.spacing
+    raw = channel.load()
+    sides: Any = channel.spacing
     values = np.asarray(raw, dtype=float)
     if channel.kind == "points":
         points = values[np.isfinite(values[:, :2]).all(axis=1)]
@@ -90,9 +96,11 @@ def _labelled(file: ScanFile, channel: Channel, given: Mapping[str, Any]) -> xr.
     if file.format in TOP_FIRST:
         values = values[:, ::-1]
     if channel.positions is None or spacing is not None:
-        h = labelled(values, spacing or tuple(float(f"{d * xy:.15g}") for d in sides))
+        dx, dy = spacing or (float(f"{d * xy:.15g}") for d in sides)
+        h = labelled(values, (dx, dy))
     else:
-        h = with_coordinates(values, *(at * xy for at in channel.positions))
+        x, y = channel.positions
+        h = with_coordinates(values, x * xy, y * xy)
     if isinstance(raw, xr.DataArray):  # keep further attributes and coordinates of a grid file
         h = h.assign_coords({name: (("x", "y"), one.values) for name, one in raw.coords.items() if one.ndim == 2})
         h.attrs |= {key: value for key, value in raw.attrs.items() if key not in ("units", "long_name")}

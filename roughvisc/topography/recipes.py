@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
 from numbers import Integral
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 import scipy.fft
@@ -256,7 +256,8 @@ def self_affine(
             f"no wave of the domain is longer than shortcut = {format_quantity(shortcut, 'm')}: expected a larger size"
         )
     heights = random_heights(amplitude, shape[1], entropy, normal=amplitudes == "gaussian")
-    heights *= (rms_slope or rms_height) / math.sqrt(square)
+    rms = rms_height if rms_slope is None else rms_slope
+    heights *= cast(float, rms) / math.sqrt(square)
     parameters = {"hurst": hurst, "rms_slope": rms_slope, "rms_height": rms_height, "rolloff": rolloff}
     parameters |= {"shortcut": shortcut, "anisotropy": anisotropy, "amplitudes": amplitudes, "seed": stated_seed}
     return generated(heights, "self_affine", parameters, size, period=list(size))
@@ -338,7 +339,7 @@ def grown(h: xr.DataArray, factor: float = 1.5) -> xr.DataArray | None:
         return None
     heights = evaluate(wider[0][:, None] - centre[0], wider[1] - centre[1])
     line = f"grown from {h.sizes['x']} x {h.sizes['y']} to {heights.shape[0]} x {heights.shape[1]} cells"
-    return noted(with_coordinates(heights, *wider, h.attrs), line)
+    return noted(with_coordinates(heights, wider[0], wider[1], h.attrs), line)
 
 
 def remade(h: xr.DataArray, shape: tuple[int, int]) -> xr.DataArray | None:
@@ -393,9 +394,9 @@ def surrogates(h: xr.DataArray, count: int, *, seed: int) -> xr.DataArray:
     >>> rv.surrogates(scan, 3, seed=7).sizes["realisation"]
     3
     """
-    numbers = np.arange(1, whole("count", count, 1) + 1)
+    numbers = range(1, whole("count", count, 1) + 1)
     found = [surrogate(h, number, seed=seed) for number in numbers]
-    return xr.concat(found, xr.DataArray(numbers, dims="realisation", name="realisation"))
+    return xr.concat(found, xr.DataArray(np.array(numbers), dims="realisation", name="realisation"))
 
 
 def surrogate(h: xr.DataArray, number: int, *, seed: int = 0) -> xr.DataArray:

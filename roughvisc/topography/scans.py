@@ -110,7 +110,16 @@ def open_scan(
         If the checksum in an X3P file is wrong, an index row or column is removed, a number is taken for missing
         points, or cells of `grid` hold no point.
     """
-    given = {key: value for key, value in locals().items() if key != "path" and value is not None}
+    options = {
+        "format": format,
+        "channel": channel,
+        "unit": unit,
+        "spacing": spacing,
+        "grid": grid,
+        "no_data": no_data,
+        "height_scale": height_scale,
+    }
+    given = {key: value for key, value in options.items() if value is not None}
     path = existing(path)
     if not is_card(path):
         return read_file(path, given)
@@ -277,7 +286,8 @@ def check_surface(table: Mapping[str, Any], where: str = "surface") -> None:
     recipe = one_of(f"{where}.generate", table["generate"], RECIPES) if source_key == "generate" else ""
     known = arguments(RECIPES[recipe]) if recipe else arguments(open_scan, 1)
     refuse_unknown(where, table, (source_key, *known, *step_keys, *place_keys))
-    condition(NoData(), steps, where)
+    no_data: Any = NoData()
+    condition(no_data, steps, where)
     if source_key == "generate":
         check_recipe(where, source)
     else:

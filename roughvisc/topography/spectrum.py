@@ -23,9 +23,12 @@ from roughvisc.units import Quantity, number, quantities
 #: Share of the mean square slope in the waves down to the shortest wave of a surface.
 _OF_SLOPE = 0.99
 #: Largest bandwidth of waves of nearly one length, of their heights and of their slopes, and fewest cells along a side.
-_OF_HEIGHTS, _OF_SLOPES, _FEWEST = 1.15, 1.1, 8
+_OF_HEIGHTS = 1.15
+_OF_SLOPES = 1.1
+_FEWEST = 8
 #: Largest change by rounding of an overlap, relative to a cell, and of a wavevector, relative to the width of a ring.
-_ROUNDING, _ON_RING = 1e-9, 1e-9
+_ROUNDING = 1e-9
+_ON_RING = 1e-9
 
 
 def hann(z: np.ndarray) -> np.ndarray:
@@ -37,7 +40,8 @@ def hann(z: np.ndarray) -> np.ndarray:
 
 def wavevectors(shape: tuple[int, ...], cells: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the wavevectors along x and, from zero on, along y [rad/m], and the number of modes of each column."""
-    (nx, ny), (dx, dy) = shape, cells
+    nx, ny = shape
+    dx, dy = cells
     count = np.where(2 * np.arange(ny // 2 + 1) % ny == 0, 1.0, 2.0)  # two if the conjugate is not stored
     return 2 * np.pi * scipy.fft.fftfreq(nx, dx), 2 * np.pi * scipy.fft.rfftfreq(ny, dy), count
 
@@ -60,7 +64,8 @@ def last_octave(z: np.ndarray, cells: tuple[float, float]) -> tuple[np.ndarray, 
         Half the wave number below which 99 % of the mean square slope lie; zero for a flat surface. [rad/m]
     """
     q_x, q_y, count = wavevectors(z.shape, cells)
-    q, power = np.hypot(q_x[:, None], q_y), count * np.abs(scipy.fft.rfft2(z, norm="forward")) ** 2
+    q = np.hypot(q_x[:, None], q_y)
+    power = count * np.abs(scipy.fft.rfft2(z, norm="forward")) ** 2
     order = np.argsort(q, axis=None)
     summed = np.cumsum((q**2 * power).ravel()[order])
     end = q.ravel()[order][np.searchsorted(summed, _OF_SLOPE * summed[-1])] if summed[-1] > 0 else 0.0
@@ -84,7 +89,9 @@ def is_narrow_band(h: xr.DataArray) -> bool:
     ----------
     .. [1] P. R. Nayak, J. Lubr. Technol. 93 (1971) 398.
     """
-    z, cells, moments = h.values - h.values.mean(), spacing(h), list[float]()
+    z = h.values - h.values.mean()
+    cells = spacing(h)
+    moments = list[float]()
     axes = [axis for axis in (0, 1) if h.shape[axis] > 1]  # heights do not vary across a strip
     if min((h.shape[axis] for axis in axes), default=0) < _FEWEST:
         return False
@@ -138,7 +145,8 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
     h = checked(h, "psd", least=1)
     require_complete(h, "psd")
     one_of("window", window, (None, "hann"))
-    cells, shape = spacing(h), h.shape
+    cells = spacing(h)
+    shape = h.shape
     q_x, q_y, stands_for = wavevectors(shape, cells)
     step = 2 * np.pi / min((n * d for n, d in zip(shape, cells, strict=True) if n > 1), default=1.0)
     z = h.values - h.values.mean()
@@ -207,12 +215,15 @@ def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | Non
     """
     shape = counts("shape", shape)
     h = checked(h, "resample")
-    missing, period = np.isnan(h.values), _period(h, periodic)
+    missing = np.isnan(h.values)
+    period = _period(h, periodic)
     values = membrane(h.values)
     if period:
-        heights, way = resample_periodic(values, shape), "by Fourier interpolation"
+        heights = resample_periodic(values, shape)
+        way = "by Fourier interpolation"
     else:
-        heights, way = _cosines(_cosines(values, shape[0], 0), shape[1], 1), "by cosines"
+        heights = _cosines(_cosines(values, shape[0], 0), shape[1], 1)
+        way = "by cosines"
     if missing.any():
         cells = zip(h.shape, shape, strict=True)
         along_x, along_y = (shares(np.arange(old + 1) / old, np.arange(new + 1) / new) for old, new in cells)
@@ -221,7 +232,7 @@ def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | Non
     for axis, d, old, new in zip(("x", "y"), spacing(h), h.shape, shape, strict=True):
         axes.append(float(h[axis][0]) - d / 2 + (np.arange(new) + 0.5) * (d * old / new))
     line = f"resampled: {h.shape[0]} x {h.shape[1]} to {shape[0]} x {shape[1]} cells, {way}"
-    return noted(with_coordinates(heights, *axes, h.attrs), line, period=period)
+    return noted(with_coordinates(heights, axes[0], axes[1], h.attrs), line, period=period)
 
 
 @quantities(shortest="m > 0")
@@ -249,16 +260,20 @@ def without_short_waves(h: xr.DataArray, shortest: Quantity, periodic: bool | No
         If points are missing or the length is out of its range.
     """
     h = checked(h, "without_short_waves")
-    sides, lengths, period = spacing(h), period_of(h), _period(h, periodic)
+    sides = spacing(h)
+    lengths = period_of(h)
+    period = _period(h, periodic)
     shortest = number(shortest, "m", "shortest", least=2 * max(sides) * (1 - _ROUNDING), below=min(lengths))
     require_complete(h, "without_short_waves")
     limit = (2 * np.pi / shortest) * (1 + _ROUNDING)
     if period:
         q_x, q_y, _ = wavevectors(h.shape, sides)
-        heights_q, inverse = scipy.fft.rfft2(h.values), partial(scipy.fft.irfft2, s=h.shape)
+        heights_q = scipy.fft.rfft2(h.values)
+        inverse = partial(scipy.fft.irfft2, s=h.shape)
     else:
         q_x, q_y = (np.pi * np.arange(n) / length for n, length in zip(h.shape, lengths, strict=True))
-        heights_q, inverse = scipy.fft.dctn(h.values, norm="ortho"), partial(scipy.fft.idctn, norm="ortho")
+        heights_q = scipy.fft.dctn(h.values, norm="ortho")
+        inverse = partial(scipy.fft.idctn, norm="ortho")
     heights = inverse(np.where(np.hypot(q_x[:, None], q_y) <= limit, heights_q, 0.0))
     return noted(like(h, heights), f"waves shorter than {shortest:.6g} m left out", period=period)
 

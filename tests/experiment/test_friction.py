@@ -30,6 +30,21 @@ def test_dataset__has_declared_variables_over_the_speeds_as_given(curve):
     assert float(curve.friction_coefficient[0]) == float(curve.friction_coefficient.max())
 
 
+def test_stated_errors__cover_the_errors_of_a_loose_tolerance():
+    """Of area, mean pressure, friction and its coefficient, on rough surfaces at small and at large load."""
+    beyond = dict.fromkeys(("contact_area", "mean_contact_pressure", "friction_force", "friction_coefficient"), 0)
+    for seed in range(4):
+        rough = rv.self_affine((1e-3, 0.9e-3), (32, 28), hurst=0.8, rms_slope=0.1, rolloff=5e-4, seed=seed)
+        for pressure in (3e3, 3e4):
+            press = {"pressure": pressure, "speeds": [1e-3, 0.2], "fields": (), "progress": False}
+            exact = rv.friction(rough, RUBBER, **press, tolerance=1e-7)
+            loose = rv.friction(rough, RUBBER, **press, tolerance=1e-3)
+            for name in beyond:
+                error = loose[f"{name}_error"] + 1e-12 * abs(exact[name])
+                beyond[name] += int((abs(loose[name] - exact[name]) > error).sum())
+    assert set(beyond.values()) == {0}, beyond
+
+
 def test_directions__are_those_of_a_turned_surface():
     """Whichever the direction, as along x of the surface turned by so many right angles."""
     one = {"pressure": 2e4, "speeds": 0.2, "fields": ("pressure",), "grid_error": True}

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from support import at_rows
+from support import assert_missing_as_declared, at_rows
 
 import roughvisc as rv
+from roughvisc.variables import VARIABLES
 
 ROWS = np.append(0.0, np.geomspace(1e-4, 10.0, 1200))
 BALL = rv.sphere(1.0, 1.6, 17)
@@ -58,10 +59,13 @@ def test_every_row__states_an_error_and_agrees_with_its_fields_and_steps(materia
     steps = rv.observables.history(ds)
     rows = at_rows(ds)
     both = rows.assign(ds.data_vars)
-    errors = ["stated_error", "time_error", "residual", "approach_error", "contact_area_error", "work_error"]
-    for name in errors + ["friction_force_error"] * pressed.slides:
-        assert np.isfinite(both[name]).all(), name
-        assert (both[name] >= 0).all(), name
+    assert_missing_as_declared(both)
+    names = {variable.error for variable in VARIABLES.values()} & set(both.variables)
+    assert len(names) == (7 if pressed.slides else 5)
+    for name in {"stated_error", "time_error", "residual", *names}:
+        assert not (both[name] < 0).any(), name
+    loaded = both.isel(time=(ds.force > 0).values)
+    assert (loaded.mean_contact_pressure * loaded.contact_area).values == pytest.approx(loaded.force.values)
     for name in rows.data_vars.keys() & ds.data_vars.keys():
         np.testing.assert_array_equal(rows[name], ds[name], err_msg=name)
     cell = 1.6**2 / BALL.size
@@ -75,7 +79,6 @@ def test_every_row__states_an_error_and_agrees_with_its_fields_and_steps(materia
         began, end = pressed.corners[1:3]
         distance = np.interp(steps.time, [began, end], [0.0, stroke])
         assert steps.sliding_distance.values == pytest.approx(distance, abs=0.5 * 1.6 / 17)  # whole cells
-        loaded = ds.isel(time=(ds.force > 0).values)
         assert (loaded.friction_coefficient * loaded.force).values == pytest.approx(loaded.friction_force.values)
         largest = float(steps.friction_force.max())
         assert largest < 1e-12 if material == "elastic" else largest > 1e-5
@@ -89,6 +92,21 @@ def test_jump_alone__is_that_of_the_instantaneous_compliance(material):
         rv.simulate(BALL, MATERIALS[name], PROGRAMS["jump alone"], **settings) for name in (material, "elastic")
     )
     assert ds.approach.values == pytest.approx(elastic.approach.values, rel=2e-3)
+
+
+@pytest.mark.parametrize("control", ["load", "approach"])
+def test_mean_contact_pressure__is_hertzs_within_its_errors(control):
+    """Two thirds of the peak pressure, in each row: the small contacts of few cells state more."""
+    program = rv.Program().load(0.1, over=1.0) if control == "load" else rv.Program().approach(0.2, over=1.0)
+    ds = rv.simulate(rv.sphere(1.0, 1.6, 33), rv.elastic(1.0), program, times=5, grid_error=True, progress=False)
+    rows = ds.isel(time=slice(1, None))
+    exact = [rv.closed_forms.hertz(1.0, 4.0, float(force)).peak_pressure * 2 / 3 for force in rows.force]
+    if control == "approach":  # a = sqrt(R d), and p = 4 E* a / (3 pi R)
+        exact = 4 * 4.0 * np.sqrt(rows.approach.values) / (3 * np.pi)
+    of_grid = rows.grid_error_mean_pressure * float(ds.mean_contact_pressure.max())
+    error = (rows.mean_contact_pressure_error + of_grid).values
+    assert (abs(rows.mean_contact_pressure.values - exact) <= error).all()
+    assert error[-1] < 0.2 * exact[-1]
 
 
 def test_ancillary_variables__exist():

@@ -52,13 +52,18 @@ def test_friction__refuses_other_results(other):
         rv.plot.friction(other)
 
 
-def test_friction__draws_the_error_of_the_grid_as_a_band():
-    errors = {"grid_error_friction": [0.1, 0.5, np.nan], "grid_error_area": [0.1, 0.1, 0.1]}
-    left, _ = rv.plot.friction(label(curve().assign({name: ("speed", one) for name, one in errors.items()}))).axes
-    (band,) = left.collections
+@pytest.mark.parametrize("axis", ["speed", "time"])
+def test_history__draws_the_stated_error_and_that_of_the_grid_as_a_band(axis):
+    """The error of the grid is relative to the same speed, or to the largest row over time."""
+    errors = {"grid_error_friction": [0.1, 0.5, np.nan], "friction_coefficient_error": [0.01, 0.02, 0.01]}
+    ds = curve().assign({name: ("speed", values) for name, values in errors.items()}).rename(speed=axis)
+    (ax,) = rv.plot.history(label(ds), "friction_coefficient").axes
+    (band,) = ax.collections
     points = np.concatenate([path.vertices for path in band.get_paths()])
-    values, error = curve()["friction_coefficient"].values, np.array(errors["grid_error_friction"])
-    ends = np.concatenate([values * (1 - error), values * (1 + error)])
+    values = ds["friction_coefficient"].values
+    scale = values if axis == "speed" else values.max()
+    error = scale * np.array(errors["grid_error_friction"]) + errors["friction_coefficient_error"]
+    ends = np.concatenate([values - error, values + error])
     np.testing.assert_allclose(np.unique(points[:, 1].round(9)), np.unique(ends[np.isfinite(ends)].round(9)))
 
 

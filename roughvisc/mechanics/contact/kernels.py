@@ -25,7 +25,9 @@ except ImportError:  # tools that import every module need no GPU
 
 Array = Any  # an array of CuPy
 #: Threads of a block, largest number of blocks, and largest number of sums of a kernel.
-THREADS, BLOCKS, SUMS = 256, 528, 10
+THREADS = 256
+BLOCKS = 528
+SUMS = 10
 
 
 @cache
@@ -71,14 +73,20 @@ def measure(
     contact = summed("contact_level", cells.size, pressure, separation, cells)
     sums = summed("find", segments, *surface, gap, contact, level, int(under_load), numbers).tolist()
     free, touching, total, separations, weighted, undeformed, level, highest, most, least = sums
-    count, ends = int(free), cupy.cumsum(numbers)
-    cells, held, residual = cupy.empty(count, np.int64), cupy.empty(count), cupy.empty(count)
+    count = int(free)
+    ends = cupy.cumsum(numbers)
+    cells = cupy.empty(count, np.int64)
+    loads = cupy.empty(count)
+    residual = cupy.empty(count)
     if count == 0:
-        return Free(cells, held, residual, level, 0, 0.0, 0.0, 0.0, level, 0.0, 0.0, 0.0, ends)
+        return Free(cells, loads, residual, level, 0, 0.0, 0.0, 0.0, level, 0.0, 0.0, 0.0, ends)
     mean = separations / count if under_load else level
-    launch("gather", segments, *surface, level, mean, ends, cells, held, residual)
-    size, energy = max(most - mean, mean + least), max(weighted - undeformed, 0.0)
-    return Free(cells, held, residual, level, int(touching), size, total, highest, -least, most, weighted, energy, ends)
+    launch("gather", segments, *surface, level, mean, ends, cells, loads, residual)
+    size = max(most - mean, mean + least)
+    energy = max(weighted - undeformed, 0.0)
+    return Free(
+        cells, loads, residual, level, int(touching), size, total, highest, -least, most, weighted, energy, ends
+    )
 
 
 class Scatter(passes.Scatter):
@@ -111,11 +119,15 @@ def preconditioned(grid: Grid, found: Free, waves: LongWaves | None, on_grid: Sc
     """Return a pressure at the free cells that approximately removes the residual."""
     if waves is None:
         return passes.preconditioned(grid, found, None, on_grid)
-    cells, count, size = found.cells, found.cells.size, found.size
-    direction, shapes = cupy.empty(count), (*grid.shape, *waves.blocks.shape)
+    cells = found.cells
+    count = found.cells.size
+    size = found.size
+    direction = cupy.empty(count)
+    shapes = (*grid.shape, *waves.blocks.shape)
     launch("rest", count, found.residual, waves.left, waves.free, cells, *shapes, direction)
     solution = grid.inverse(on_grid(direction, cells, size))
-    eased, total = block_pressure(waves), cupy.empty(waves.blocks.size)
+    eased = block_pressure(waves)
+    total = cupy.empty(waves.blocks.size)
     launch("field_sums", waves.blocks.size, solution, size, cells, waves.place, *shapes, total)
     launch("join", count, solution, size, eased, total, waves.free, cells, *shapes, direction)
     return direction
@@ -130,7 +142,10 @@ def block_pressure(waves: LongWaves) -> Array:
     ----------
     .. [1] A. T. Chronopoulos, C. W. Gear, J. Comput. Appl. Math. 25 (1989) 153.
     """
-    blocks, free, local, count = waves.blocks, waves.free, waves.local, waves.blocks.size
+    blocks = waves.blocks
+    free = waves.free
+    local = waves.local
+    count = waves.blocks.size
     found, search, moved, response, eased, loads, zeros = cupy.zeros((7, count))
     settings = response, free, local, blocks.self_influence * waves.part, waves.part
     vectors = found, search, moved, waves.left, eased, loads
@@ -148,7 +163,9 @@ def conjugate(
     direction: Array, residual: Array, last: Last | None, on_grid: Scatter, cells: Array, under_load: bool
 ) -> tuple[Array, float]:
     """Return the direction of the step, and the L1 norm of the preconditioned residual."""
-    count, curvature, before = direction.size, 0.0, direction
+    count = direction.size
+    curvature = 0.0
+    before = direction
     if last is None:
         sums = direction.sum(keepdims=True)
     else:
@@ -163,7 +180,8 @@ def cut_step(
     held: Array, direction: Array, residual: Array, length: float, load: float | None
 ) -> tuple[Array, Array, float]:
     """Return the pressure after a step, cut at zero, the change of the pressure, and the slope of the energy."""
-    trial, change = cupy.empty(held.size), cupy.empty(held.size)
+    trial = cupy.empty(held.size)
+    change = cupy.empty(held.size)
     carried = summed("cut", held.size, held, direction, length, trial)
     slope, ratio, *_ = summed("scale", held.size, held, residual, carried, load or 0.0, trial, change).tolist()
     return trial, change, slope if ratio > 0 else 0.0

@@ -59,7 +59,8 @@ class LongWaves(NamedTuple):
         """Return the blocks of the free cells; None if they do not pay."""
         if found.cells.size > SPARSE * grid.size:
             return None
-        blocks, part = grid.coarse, grid.cell_area / grid.coarse.cell_area
+        blocks = grid.coarse
+        part = grid.cell_area / grid.coarse.cell_area
         free, loads, left, place = passes.block_sums(grid, found)
         displaced = blocks.displacement((loads * part).reshape(blocks.shape)).reshape(-1)
         smooth, spread, whole = passes.spot_sums(loads, displaced, free, FULL * grid.size / blocks.size)

@@ -42,7 +42,9 @@ from roughvisc.mechanics.grid import Boundary, Grid, namespace
 Array = Any  # an array of NumPy or CuPy, depending on the grid
 
 #: Change of the step length from one iteration to the next: smallest, largest, and largest after a cut step.
-SHRINK, GROW, GROW_AFTER_CUT = 0.3, 3.0, 1.3
+SHRINK = 0.3
+GROW = 3.0
+GROW_AFTER_CUT = 1.3
 #: Shorter steps than this part of a trial are replaced by a projected-gradient step.
 SHORTEST_STEP = 1e-3
 #: Iterations in which the duality gap must halve.
@@ -54,7 +56,8 @@ GAP_SLACK = 1.5
 NEARLY_MINIMUM = 0.1
 #: Safety factor that makes the estimated error hardly ever too small; and the factor with the second level of the
 #: preconditioner.
-CAUTION, CAUTION_WITH_BLOCKS = 1.3, 2.4
+CAUTION = 1.3
+CAUTION_WITH_BLOCKS = 2.4
 #: Rounding of a displacement, relative to its largest value.
 ROUNDING = 8 * float(np.finfo(float).eps)
 #: Distance to the approach of full contact, over the approach, below which the load is undetermined.
@@ -62,7 +65,8 @@ NEAREST_TO_FULL = 1e-12
 #: Distance to the approach of full contact, over the approach, below which the mean gap needs separate weights.
 NEARLY_FULL = 1e-3
 #: Number of cells a side from which a problem without a first guess is solved on half as many first; tolerance there.
-COARSE_FROM, COARSE_TOLERANCE = 256, 0.03
+COARSE_FROM = 256
+COARSE_TOLERANCE = 0.03
 #: Number of cells a side from which the second level of the preconditioner may pay. Measured at 512 squared: 3 to 14 %
 #: more time for 10 to 15 % fewer iterations; at 768, 0 to 18 % less time; at 1024, 6 to 30 % less.
 BLOCKS_FROM = 768
@@ -414,13 +418,15 @@ class ScaledProblem:
 def coarse_guess(grid: Grid, gap: Array, load: float) -> Array:
     """Return the pressure of the same problem on half as many cells a side, on the cells of the grid. [-]"""
     shape = (gap.shape[0] // 2, gap.shape[1] // 2)
-    xp, coarse, sides = grid.xp, grid.on(shape), list(zip(gap.shape, shape, strict=True))
+    xp = grid.xp
+    coarse = grid.on(shape)
+    sides = list(zip(gap.shape, shape, strict=True))
     rows, columns = (-(-xp.arange(m) * n // m) for n, m in sides)  # an odd number of cells: one is left out
     few = xp.stack([gap[xp.ix_(rows + i, columns + j)] for i in (0, 1) for j in (0, 1)]).mean(axis=0)
-    found = solve_contact(coarse, few, load=load * few.size / gap.size, tolerance=COARSE_TOLERANCE)
+    coarse_state = solve_contact(coarse, few, load=load * few.size / gap.size, tolerance=COARSE_TOLERANCE)
     grid.convolutions += coarse.convolutions
     rows, columns = (xp.arange(n) * m // n for n, m in sides)
-    return found.pressure[xp.ix_(rows, columns)]
+    return coarse_state.pressure[xp.ix_(rows, columns)]
 
 
 # ----------------------------------------------------------------------------------------------- steps of an iteration
@@ -478,7 +484,9 @@ def projected_gradient_step(grid: Grid, free: Free, under_load: bool) -> tuple[A
 
 def onto_simplex(values: Array, total: float) -> Array:
     """Return the nearest non-negative vector with a given sum."""
-    xp, shifted = namespace(values), values - values.max()  # otherwise a small sum is lost next to large values
+    # otherwise a small sum is lost next to large values
+    xp = namespace(values)
+    shifted = values - values.max()
     ordered = xp.sort(shifted)[::-1]
     excess = (xp.cumsum(ordered) - total) / xp.arange(1, ordered.size + 1)
     return xp.maximum(shifted - excess[int((ordered > excess).sum()) - 1], 0)
@@ -575,7 +583,8 @@ def neighbours(mask: Array, boundary: Boundary, outside: bool = False) -> Iterat
     [[True, True], [False, False]]
     """
     for own in (mask, mask.T):
-        lower, upper = np.empty_like(own), np.empty_like(own)
+        lower = np.empty_like(own)
+        upper = np.empty_like(own)
         lower[1:], lower[0] = own[:-1], {"free": outside, "periodic": own[-1], "mirror": own[0]}[boundary]
         upper[:-1], upper[-1] = own[1:], {"free": outside, "periodic": own[0], "mirror": own[-1]}[boundary]
         yield from (lower, upper) if own is mask else (lower.T, upper.T)

@@ -18,11 +18,11 @@ from roughvisc.paths import cause_of_system
 from roughvisc.topography.formats import binary, text
 from roughvisc.topography.formats.scan_file import Channel, ScanFile
 
-__all__ = ["Channel", "ScanFile", "add_format", "open_file", "orientation", "supported_formats"]
+__all__ = ["READERS", "Channel", "ScanFile", "add_format", "open_file", "orientation", "supported_formats"]
 
 #: Format -> suffixes without the dot, and its reader, for formats with a reader in this package. A text format without
 #: a suffix is recognised by its content.
-_FORMATS: dict[str, tuple[Sequence[str], Callable[[Path], ScanFile]]] = {
+READERS: dict[str, tuple[Sequence[str], Callable[[Path], ScanFile]]] = {
     "x3p": (("x3p",), binary.read_x3p),
     "sdf": (("sdf",), binary.read_sdf),
     "npy": (("npy",), binary.read_npy),
@@ -57,12 +57,12 @@ TOP_FIRST = {
     **dict.fromkeys(("di", "ezd", "frt", "ibw", "jpk", "mdt", "mi", "ps", "wsxm"), _GWYDDION),
 }
 #: Evidence for formats that define the direction of y, and for all others.
-_STATED = {
+STATED = {
     "wyko": "not verified: each line is a column of the map from the bottom up, as Gwyddion reads it",
     "nc": "verified: the coordinates in the file",
     "xyz": "verified: the coordinates in the file",
 }
-_TAKEN = "not verified: rows are taken to run along x and the first to be y = 0; it may be a mirror image"
+TAKEN = "not verified: rows are taken to run along x and the first to be y = 0; it may be a mirror image"
 
 
 def open_file(path: Path, format: str | None) -> ScanFile:
@@ -71,7 +71,7 @@ def open_file(path: Path, format: str | None) -> ScanFile:
     for name in names:
         default = partial(binary.read_with_surface_topography, format=name)
         try:
-            file = _FORMATS.get(name, ((), default))[1](path)
+            file = READERS.get(name, ((), default))[1](path)
             if name == names[-1] or any(channel.is_height for channel in file.channels):
                 return file
         except Exception as error:  # readers raise many types, such as struct.error and KeyError
@@ -101,7 +101,7 @@ def add_format(format: str, suffixes: Sequence[str] | str, read: Callable[[Path]
         ``read(path)`` returns a :class:`ScanFile`. Any exception is reported as an
         :class:`~roughvisc.errors.InputError` that names the file.
     """
-    _FORMATS[format] = tuple(suffix.lower().removeprefix(".") for suffix in listed_names(suffixes)), read
+    READERS[format] = tuple(suffix.lower().removeprefix(".") for suffix in listed_names(suffixes)), read
 
 
 def supported_formats() -> dict[str, Sequence[str]]:
@@ -115,17 +115,17 @@ def supported_formats() -> dict[str, Sequence[str]]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         from SurfaceTopography.IO import readers  # slow to import
-    known = {reader.format(): tuple(reader.file_extensions() or ()) for reader in readers}
-    known["di"] += ("di", "000 to 999")
-    known["jpk"] += ("jpk-qi-image",)
-    known |= {name: theirs for name, (theirs, _) in _FORMATS.items()}
+    known: dict[str, Sequence[str]] = {reader.format(): tuple(reader.file_extensions() or ()) for reader in readers}
+    known["di"] = (*known["di"], "di", "000 to 999")
+    known["jpk"] = (*known["jpk"], "jpk-qi-image")
+    known |= {name: theirs for name, (theirs, _) in READERS.items()}
     return dict(sorted(known.items()))
 
 
 def _formats_of(path: Path) -> Sequence[str]:
     """Return the formats to try for the suffix of a file, in order."""
     suffix = _suffix(path)
-    if quick := [name for name, (theirs, _) in _FORMATS.items() if suffix in theirs][-1:] or _SHARED.get(suffix):
+    if quick := [name for name, (theirs, _) in READERS.items() if suffix in theirs][-1:] or _SHARED.get(suffix):
         return quick
     known = supported_formats()
     wanted = "000 to 999" if len(suffix) == 3 and suffix.isdigit() else suffix
@@ -161,4 +161,4 @@ def orientation(format: str) -> str:
     >>> orientation("tmd").partition(":")[0], orientation("plu").partition(":")[0]
     ('verified', 'not verified')
     """
-    return TOP_FIRST.get(format) or _STATED.get(format, _TAKEN)
+    return TOP_FIRST.get(format) or STATED.get(format, TAKEN)

@@ -23,9 +23,11 @@ from roughvisc.units import is_quantity, number
 
 #: First bytes of a TrueMap file, and of a Digital Surf file without and with compression.
 _TRUEMAP = b"Binary TrueMap Data File v2.0"
-_DIGITAL_SURF, _COMPRESSED = b"DIGITAL SURF", b"DSCOMPRESSED"
+_DIGITAL_SURF = b"DIGITAL SURF"
+_COMPRESSED = b"DSCOMPRESSED"
 #: Size of the header, and the offset at which it states the sizes of the comment and the private zone. [byte]
-_HEADER, _SIZES = 512, 334
+_HEADER = 512
+_SIZES = 334
 
 
 def read_x3p(path: Path) -> ScanFile:
@@ -38,11 +40,14 @@ def read_x3p(path: Path) -> ScanFile:
     except x3pio.X3pChecksumError as error:
         complaints.append(f"its checksum is wrong ({error}): it was changed or damaged after it was written")
         content = x3pio.read(path, verify=False)
-    channels, sides = [], (content.header.x.increment, content.header.y.increment)
+    channels = []
+    sides = (content.header.x.increment, content.header.y.increment)
     for i, layer in enumerate(content.layers):
-        heights, kind = layer.z.T, "height"
-        if content.feature_type == x3pio.FeatureType.POINT_CLOUD:
-            heights, kind = np.stack([layer.x, layer.y, layer.z], axis=-1).reshape(-1, 3), "points"
+        heights = layer.z.T
+        kind = "height"
+        if content.feature_type == x3pio.FeatureType.POINT_CLOUD and layer.x is not None and layer.y is not None:
+            heights = np.stack([layer.x, layer.y, layer.z], axis=-1).reshape(-1, 3)
+            kind = "points"
         elif heights.ndim < 2 or not layer.is_regular_grid:
             kind = "a profile, or a map on absolute axes"
         channels.append(Channel(f"layer {i}", partial(np.array, heights, float), "m", "m", sides, kind=kind))
@@ -70,8 +75,8 @@ def read_netcdf(path: Path) -> ScanFile:
         options: dict[str, Any] = {"engine": "scipy" if stream.read(3) == b"CDF" else "netcdf4", "decode_times": False}
     # netCDF-4 is not thread-safe, and xarray would lock only the reading
     with NETCDF4_PYTHON_LOCK, xr.open_dataset(path, lock=False, **options) as dataset:
-        found = [_variable(str(name), one) for name, one in dataset.data_vars.items() if one.ndim >= 2]
-    return ScanFile("nc", found)
+        channels = [_variable(str(name), one) for name, one in dataset.data_vars.items() if one.ndim >= 2]
+    return ScanFile("nc", channels)
 
 
 def _variable(name: str, variable: xr.DataArray) -> Channel:
@@ -94,9 +99,9 @@ def read_truemap(path: Path) -> ScanFile:
     content = path.read_bytes()
     if not content.startswith(_TRUEMAP):
         raise InputError(f"found {content[: len(_TRUEMAP)]!r} at its beginning: expected {_TRUEMAP.decode()!r}")
-    at = content.index(b"\0", content.index(b"\0") + 1) + 1
-    columns, rows, width, height = struct.unpack_from("<2I2f", content, at)
-    heights = np.frombuffer(content, "<f4", columns * rows, at + 24).reshape(rows, columns).T.astype(float)
+    offset = content.index(b"\0", content.index(b"\0") + 1) + 1
+    columns, rows, width, height = struct.unpack_from("<2I2f", content, offset)
+    heights = np.frombuffer(content, "<f4", columns * rows, offset + 24).reshape(rows, columns).T.astype(float)
     return single_map("tmd", heights, "mm", "mm", (width / columns, height / rows))
 
 
@@ -111,10 +116,11 @@ def read_digital_surf(path: Path) -> ScanFile:
         return read_with_surface_topography(path, "sur")
     begin = _HEADER + sum(struct.unpack_from("<2H", content, _SIZES))
     (count,) = struct.unpack_from("<I", content, begin)
-    expanded, at = _DIGITAL_SURF + content[len(_DIGITAL_SURF) : begin], begin + 4 + 8 * count
-    for raw, packed in struct.iter_unpack("<2I", content[begin + 4 : at]):
-        expanded += zlib.decompressobj().decompress(content[at : at + packed], raw)
-        at += packed
+    expanded = _DIGITAL_SURF + content[len(_DIGITAL_SURF) : begin]
+    offset = begin + 4 + 8 * count
+    for raw, packed in struct.iter_unpack("<2I", content[begin + 4 : offset]):
+        expanded += zlib.decompressobj().decompress(content[offset : offset + packed], raw)
+        offset += packed
     return read_with_surface_topography(BytesIO(expanded), "sur")
 
 
@@ -132,7 +138,8 @@ def read_with_surface_topography(source: Path | BytesIO | StringIO, format: str)
 def _channel(found: Any) -> Channel:
     from SurfaceTopography.Support.UnitConversion import is_length_unit
 
-    shape, sizes = tuple(int(n) for n in found.nb_grid_pts or ()), found.physical_sizes
+    shape = tuple(int(n) for n in found.nb_grid_pts or ())
+    sizes = found.physical_sizes
 
     def load() -> np.ndarray:
         topography = found.topography(**({} if sizes is not None else {"physical_sizes": shape}))
@@ -143,7 +150,8 @@ def _channel(found: Any) -> Channel:
     is_length = all(isinstance(unit, str) and is_length_unit(unit) for unit in units)
     if not (found.is_height_channel and found.dim == 2 and is_length and found.is_uniform is not False):
         return Channel(str(found.channel_id), load, kind="no areal height on a uniform grid")
-    lateral, sides = found.unit, None
+    lateral = found.unit
+    sides = None
     if sizes is not None:
         sides = (float(sizes[0]) / shape[0], float(sizes[1]) / shape[1])
         header = found.info.get("raw_metadata")

@@ -23,12 +23,15 @@ from roughvisc.topography.formats.scan_file import Channel, ScanFile, single_map
 from roughvisc.units import is_quantity
 
 #: Zygo: phase counts per wave for each resolution in the header, and the count from which a point is missing.
-_COUNTS, _MISSING_COUNT = {0: 4096, 1: 32768, 2: 131072}, 2147483640
+_COUNTS = {0: 4096, 1: 32768, 2: 131072}
+_MISSING_COUNT = 2147483640
 #: A text without a header is a table, not a map, if it has fewer columns than the first number, and more lines than the
 #: second number times the columns.
-_COLUMNS, _TALL = 8, 20
+_COLUMNS = 8
+_TALL = 20
 #: Fewest numbers of an index, and their largest deviation from equal steps, in steps.
-_FEWEST, _EQUAL = 4, 1e-3
+_FEWEST = 4
+_EQUAL = 1e-3
 #: Comments of Gwyddion that state the size of a matrix, in any language, and the units of points.
 _MATRIX_SIZE = re.compile(r"^#[^:=：\n]*[:=：]\s*[\d.]+([eE][+-]?\d+)?\s*\w?[mA\u00c5]\s*$", re.MULTILINE)
 _UNITS = re.compile(r"^#\s*(Lateral|Value) units:\s*(\S+)", re.MULTILINE)
@@ -67,12 +70,14 @@ def read_table(text: str) -> tuple[list[str], list[int]]:
     widths = [len(row) for at, row in cells.items() if 1 < len(row) == known[at]]
     width = mode(widths) if widths else 0
     rows = [at for at, row in cells.items() if len(row) == known[at] == width]
-    for at in sorted(set(body) - set(rows)) if rows else ():
-        row = cells[at]
-        is_wide = known[at] >= max(3, width / 2) or (separator != " " and len(row) == width)
-        if rows[0] < at < rows[-1] or (known[at] and (is_wide or at > rows[-1])):
+    others = sorted(set(body) - set(rows)) if rows else []
+    for number in others:
+        row = cells[number]
+        is_wide = known[number] >= max(3, width / 2) or (separator != " " and len(row) == width)
+        if rows[0] < number < rows[-1] or (known[number] and (is_wide or number > rows[-1])):
             wrong = next((repr(cell) for cell in row if not _NUMBER.fullmatch(cell)), f"{len(row)} of {width} values")
-            raise InputError(f"line {at + 1}: found {wrong} among numbers ({lines[at][:60]!r}): expected numbers only")
+            found = f"found {wrong} among numbers ({lines[number][:60]!r})"
+            raise InputError(f"line {number + 1}: {found}: expected numbers only")
     lengths = [found.strip() for line in lines for found in _LENGTH.findall(line)]
     mark = decimal_mark([*lengths, *(cell for at in rows for cell in cells[at])], separator)
     lines = [_LENGTH.sub(lambda found: found[0].replace(mark, "."), line) for line in lines]
@@ -110,7 +115,8 @@ def read_numbers(text: str) -> ScanFile:
         lines[rows[0] - 1] = f"# Value units: {heading[1]}"  # as Gwyddion writes it
     text = "\n".join(lines) + "\n"
     if rows and len(lines[rows[0]].split()) == 3 and not _MATRIX_SIZE.search(text):
-        points, stated = numbers(lines, rows), dict(_UNITS.findall(text))
+        points = numbers(lines, rows)
+        stated = dict(_UNITS.findall(text))
         if named := _HEADING.search(text):
             x, stated["Lateral"], y, other, _, stated["Value"] = named.groups()
             if (x.lower(), y.lower(), other) != ("x", "y", stated["Lateral"]):
@@ -118,10 +124,10 @@ def read_numbers(text: str) -> ScanFile:
                 raise InputError(f"found the heading {named[0].strip()!r}: {expected}")
         units = stated.get("Value"), stated.get("Lateral")
         return ScanFile("xyz", [Channel("points", lambda: points, *units, kind="points")])
-    found = read_with_surface_topography(io.StringIO(text), "asc")
+    file = read_with_surface_topography(io.StringIO(text), "asc")
     complaints: list[str] = []
-    channels = [_matrix(channel, complaints) if channel.is_height else channel for channel in found.channels]
-    return replace(found, channels=channels, complaints=complaints)
+    channels = [_matrix(channel, complaints) if channel.is_height else channel for channel in file.channels]
+    return replace(file, channels=channels, complaints=complaints)
 
 
 def _matrix(channel: Channel, complaints: list[str]) -> Channel:
@@ -129,9 +135,11 @@ def _matrix(channel: Channel, complaints: list[str]) -> Channel:
     z = channel.load().T  # as in the file
     if channel.spacing is None and z.shape[1] < _COLUMNS and len(z) > _TALL * z.shape[1]:
         return replace(channel, kind=f"a table of {z.shape[1]} columns")
-    row, column = _step(z[0, 1:], z[1:, 1:]), _step(z[1:, 0], z[1:, 1:].T)
+    row = _step(z[0, 1:], z[1:, 1:])
+    column = _step(z[1:, 0], z[1:, 1:].T)
     if not (row and column):  # the corner belongs to the index that it continues
-        row, column = _step(z[0], z[1:]), _step(z[:, 0], z[:, 1:].T)
+        row = _step(z[0], z[1:])
+        column = _step(z[:, 0], z[:, 1:].T)
     if not (row or column):
         return replace(channel, load=lambda: z.T)
     labels = np.concatenate([z[0, 1:], z[1:, 0]])
@@ -139,7 +147,8 @@ def _matrix(channel: Channel, complaints: list[str]) -> Channel:
     z = z[int(row is not None) :, int(column is not None) :]
     z = z[:: -1 if (column or 0) < 0 else 1, :: -1 if (row or 0) < 0 else 1]
     removed = " and ".join(name for name, step in (("row", row), ("column", column)) if step)
-    spacing, taken = channel.spacing, "an index"
+    spacing = channel.spacing
+    taken = "an index"
     if row and column and not is_index:
         spacing, taken = spacing or (abs(row), abs(column)), "coordinates"
     complaints.append(f"the numbers of its first {removed} are in equal steps: taken as {taken}, not as heights")
@@ -173,7 +182,8 @@ def read_zygo(text: str) -> ScanFile:
     if "XYZ" in lines[0].upper():
         cells = [line.split() for line in sections[0].splitlines() if line.strip()]
         known = np.array([cell for cell in cells if "No" not in cell], dtype=float)
-        unit, heights = "um", np.full((columns, rows), np.nan)
+        unit = "um"
+        heights = np.full((columns, rows), np.nan)
         heights[known[:, 0].astype(int) - x0, known[:, 1].astype(int) - y0] = known[:, 2]
     else:
         wave = scale * wavelength * obliquity
@@ -193,7 +203,9 @@ def read_wyko(text: str) -> ScanFile:
     header, _, data = text.partition("RAW_DATA")
     lines = header.splitlines()
     stated = {line.split()[0]: line.split()[-1] for line in reversed(lines[1:]) if line.strip()}
-    columns, rows = int(stated["X"]), int(stated["Y"])  # X Size and Y Size
+    # X Size and Y Size
+    columns = int(stated["X"])
+    rows = int(stated["Y"])
     words = data.split("\n", 1)[1].lower().replace("bad", "nan").split()
     heights = np.array(words[: columns * rows], dtype=float).reshape(columns, rows)
     if lines[0].split()[-2] == "0":
@@ -204,8 +216,8 @@ def read_wyko(text: str) -> ScanFile:
 
 def read_esri(text: str) -> ScanFile:
     """Read an ESRI ASCII grid: size of the cells and number of missing points in the header, first row on top."""
-    found = re.findall(r"^\s*([A-Za-z_]+)\s+(\S+)\s*$", text, re.MULTILINE)
-    header = {key.lower(): float(value) for key, value in found}
+    entries = re.findall(r"^\s*([A-Za-z_]+)\s+(\S+)\s*$", text, re.MULTILINE)
+    header = {key.lower(): float(value) for key, value in entries}
     data = np.array(text.split()[2 * len(header) :], dtype=float).reshape(int(header["nrows"]), int(header["ncols"]))
     heights = np.where(data == header.get("nodata_value", np.nan), np.nan, data).T
     side = header.get("cellsize", np.nan)

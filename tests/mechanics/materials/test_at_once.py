@@ -48,7 +48,7 @@ NOT_SERIES = [name for name, material in OF_EACH_KIND.items() if not isinstance(
 
 
 @pytest.mark.filterwarnings("ignore:.*table:UserWarning")
-@pytest.mark.parametrize("name", [*NOT_SERIES, "table", "noisy table"])
+@pytest.mark.parametrize("name", [*NOT_SERIES, "creep_table", "noisy table"])
 def test_jump_alone__is_to_the_instantaneous_compliance(name):
     """No time passes: a material without this compliance has not moved yet."""
     material = OF_EACH_KIND[name]
