@@ -30,7 +30,7 @@ from roughvisc.mechanics.materials.tables import dynamic_table as dynamic_table
 from roughvisc.mechanics.materials.tables import relaxation_table as relaxation_table
 from roughvisc.mechanics.program import Program as Program
 from roughvisc.mechanics.sheet import sheet as sheet
-from roughvisc.reports.report import report as report
+from roughvisc.plot.report import report as report
 from roughvisc.settings import Numerics as Numerics
 from roughvisc.study.audit import audit as audit
 from roughvisc.study.case import Case as Case

@@ -1,4 +1,4 @@
-"""Eight layers: a file imports from its own part of the package and from layers below it."""
+"""Seven layers: a file imports from its own part of the package and from layers below it."""
 
 import ast
 import pathlib
@@ -16,7 +16,6 @@ LAYERS = (
     ("observables",),
     ("study",),
     ("plot",),
-    ("reports",),
     ("__init__ __main__ api cli",),
 )
 PLACE = {name: (layer, part) for layer, parts in enumerate(LAYERS) for part in parts for name in part.split()}

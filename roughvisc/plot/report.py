@@ -94,7 +94,7 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
             drawn.add(picture)
     page["written"] = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     page["version"] = metadata.version("roughvisc")
-    templates = Environment(loader=PackageLoader("roughvisc.reports", "."), autoescape=True, trim_blocks=True)
+    templates = Environment(loader=PackageLoader("roughvisc.plot", "."), autoescape=True, trim_blocks=True)
     return write_text(Path(out), templates.get_template("report.html.jinja").render(page))
 
 

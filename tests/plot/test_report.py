@@ -12,7 +12,7 @@ from support import BALL
 
 from roughvisc.cli import main
 from roughvisc.errors import InputError
-from roughvisc.reports.report import report
+from roughvisc.plot.report import report
 from roughvisc.study.case import read_cases
 from roughvisc.study.case_text import study_text
 from roughvisc.study.execution.run import run_case
