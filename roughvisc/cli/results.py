@@ -1,7 +1,9 @@
-"""Commands on results: ``plot``, ``report``, ``table``, ``audit``, ``verify`` and ``clean``."""
+"""Commands on results: ``view``, ``plot``, ``report``, ``table``, ``audit``, ``verify`` and ``clean``."""
 
 from __future__ import annotations
 
+import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,29 @@ import click
 import roughvisc as rv
 from roughvisc.cli.group import PATH, Failure, complain, counted, quantity, say_figures, say_path, screen
 from roughvisc.errors import printable
+
+
+@click.command()
+@click.argument("result", type=PATH)
+@click.option("-o", "--out", type=PATH, help="Page to write. [default: page.html in the folder, or RESULT-page.html]")
+@click.option("--no-open", is_flag=True, help="Do not open the page in a browser.")
+def view(result: Path, out: Path | None, no_open: bool) -> None:
+    """Write a page to explore a result or a folder of results, and open it in a browser.
+
+    The page shows every field at all kept times or speeds, profiles and histories of all cases. It is one file that
+    needs neither a server nor the network.
+
+    \b
+    Example:
+      roughvisc view results/focus_variation-study
+    """
+    import webbrowser
+
+    path = rv.plot.page(result, out)
+    say_path(screen(), "Page", path)
+    has_screen = sys.platform in ("darwin", "win32") or {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys()
+    if has_screen and not no_open:  # without a screen a browser of text would take the terminal
+        webbrowser.open(path.absolute().as_uri())
 
 
 @click.command()

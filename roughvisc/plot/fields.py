@@ -31,11 +31,11 @@ from roughvisc.units import Quantity, Unit, listed, quantities, unit_for
 from roughvisc.variables import AXES, FIELDS, VARIABLES, axis_of
 
 #: Field -> perceptually even colour map without the colour of contact; reduction of a block of cells to one drawn cell;
-#: colour and name of the values below the scale, which are zero or, for the flux, small. Pressure and flux darken as
-#: they rise.
-_LOOK = {
+#: colour and name of the values below the scale, which are zero or, for the flux, small. Pressure, gap and flux darken
+#: as they rise.
+LOOK = {
     "pressure": ("viridis_r", "max", style.NO_CONTACT, "no contact"),
-    "gap": ("cividis", "min", style.CONTACT, "contact"),
+    "gap": ("cividis_r", "min", style.CONTACT, "contact"),
     "displacement": ("viridis", "mean", None, ""),
     "flux": ("cividis_r", "max", style.NO_CONTACT, "below 0.1 % of the scale"),
     "height": ("cividis", "mean", None, ""),
@@ -95,22 +95,25 @@ def representative_frames(dataset: xr.Dataset) -> list[int]:
     return order[np.unique(spread)].tolist()
 
 
-def frame_of(dataset: xr.Dataset, name: str, frame: int) -> xr.DataArray:
-    """Return one frame of a field to draw; the gap in contact is exactly zero."""
-    at = dataset.isel({axis_of(dataset.variables): frame})
-    field = at[name] if "height" not in at else at[name].where(at["height"].notnull())
-    if name == "gap" and "pressure" in at:
-        field = field.where(at["pressure"].isnull() | (at["pressure"] <= 0), 0.0)
-    return drawn(field.rename(name))
+def frame_of(dataset: xr.Dataset, name: str, frame: int, cells: int | None = None) -> xr.DataArray:
+    """Return one frame of a field to draw, of at most some cells a side; the gap in contact is exactly zero."""
+    row = {axis_of(dataset.variables): frame}
+    field = dataset[name].isel(row).transpose("x", "y")
+    values = field.values
+    if "height" in dataset:
+        values = np.where(dataset["height"].transpose("x", "y").notnull(), values, np.nan)
+    if name == "gap" and "pressure" in dataset:
+        values = np.where(dataset["pressure"].isel(row).transpose("x", "y") > 0, 0.0, values)
+    return drawn(field.copy(data=values).rename(name), cells)
 
 
-def drawn(field: xr.DataArray) -> xr.DataArray:
+def drawn(field: xr.DataArray, cells: int | None = None) -> xr.DataArray:
     """Return the map to draw: for a large one, blocks of cells with their largest pressure and smallest gap."""
-    every = -(-max(field.sizes["x"], field.sizes["y"]) // MOST_CELLS)
+    every = -(-max(field.sizes["x"], field.sizes["y"]) // (cells or MOST_CELLS))
     if every > 1:
         blocks = field.coarsen(x=every, y=every, boundary="pad", coord_func="min")
         to_centre = {axis: (every - 1) / 2 * side for axis, side in zip("xy", spacing(field), strict=True)}
-        field = getattr(blocks, _LOOK[str(field.name)][1])()
+        field = getattr(blocks, LOOK.get(str(field.name), LOOK["displacement"])[1])()
         field = field.assign_coords({axis: field[axis] + shift for axis, shift in to_centre.items()})
     return field.load()
 
@@ -127,17 +130,27 @@ def map_size(field: xr.DataArray | xr.Dataset, width: float, height: float) -> t
     return min(width, height / ratio), min(height, width * ratio)
 
 
-def colour_scale(name: str, frames: Iterable[xr.DataArray]) -> tuple[Unit, Normalize]:
-    """Return unit and colour scale of a field at some rows; few values far beyond all others are above the scale."""
-    begins_at_zero, ends = _LOOK[name][2] is not None, []
+def scale_ends(name: str, frames: Iterable[xr.DataArray]) -> tuple[float, float, float]:
+    """Return the smallest value of a field at some rows, the upper end of its scale, and the largest value. [SI]
+
+    Few values far beyond all others are above the scale. Fields that begin at zero count where they are positive.
+    """
+    begins_at_zero, ends = LOOK.get(name, LOOK["displacement"])[2] is not None, []
     for frame in frames:
         known = frame.values[frame.values > 0 if begins_at_zero else np.isfinite(frame.values)]
         if known.size:
             ends.append(np.percentile(known, (0, _SHOWN, 100)))
     lowest, high, most = np.transpose(ends or [(0.0, 1.0, 1.0)])
     high = most.max() if most.max() < _SPIKE * high.max() else high.max()
-    unit = unit_for([lowest.min(), high], VARIABLES[name].units)
-    low, high = float(unit(lowest.min())), float(unit(high))
+    return float(lowest.min()), float(high), float(most.max())
+
+
+def colour_scale(name: str, frames: Iterable[xr.DataArray]) -> tuple[Unit, Normalize]:
+    """Return unit and colour scale of a field at some rows."""
+    begins_at_zero = LOOK[name][2] is not None
+    lowest, high, _ = scale_ends(name, frames)
+    unit = unit_for([lowest, high], VARIABLES[name].units)
+    low, high = float(unit(lowest)), float(unit(high))
     if name == "flux":
         return unit, LogNorm(1e-3 * high, high)
     return unit, Normalize(1e-12 * high if begins_at_zero else low, high)
@@ -157,7 +170,7 @@ def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, norm: Normalize) -> Axes
     norm : matplotlib.colors.Normalize
         Colour scale, in this unit.
     """
-    plane, (colours, _, below, _) = plane_unit(field), _LOOK[str(field.name)]
+    plane, (colours, _, below, _) = plane_unit(field), LOOK[str(field.name)]
     x, y = map(plane, cell_edges(field))
     bad = style.CONTACT if field.name == "flux" else style.MISSING
     values, extent = np.ma.masked_invalid(unit(field.transpose("y", "x"))), (x[0], x[-1], y[0], y[-1])
@@ -174,7 +187,7 @@ def _draw_field(axes: Sequence[Axes], dataset: xr.Dataset, name: str, frames: Se
     unit, norm = colour_scale(name, shown)
     for ax, one in zip(axes, shown, strict=True):
         image = draw_map(ax, one, unit, norm)
-    values, named, (_, _, below, word) = unit(np.concatenate(shown)), {}, _LOOK[name]
+    values, named, (_, _, below, word) = unit(np.concatenate(shown)), {}, LOOK[name]
     if below and (values < norm.vmin).any():
         named[word] = Patch(facecolor=below, edgecolor="0.5", lw=0.4)
     if np.isnan(values).any():
@@ -230,7 +243,7 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
         one_of("fields", name, (*FIELDS, "flux"))
     if "flux" in fields:
         expect_result(dataset, "gap")
-        dataset = dataset.assign(flux=_flux_of(dataset))
+        dataset = dataset.assign(flux=flux_of(dataset))
     stored = [name for name in fields if name in dataset]
     expect_result(dataset, *(stored or fields))
     frames = representative_frames(dataset) if times is None else frames_at(dataset, times)
@@ -248,7 +261,7 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
     return figure
 
 
-def _flux_of(dataset: xr.Dataset) -> xr.DataArray:
+def flux_of(dataset: xr.Dataset) -> xr.DataArray:
     """Return the magnitude of the flux over (time, x, y), missing in contact; each frame is computed when drawn."""
     stated = dataset["leak_rate"].attrs if "leak_rate" in dataset else {}
     options = {name: value for name, value in stated.items() if name in ("along", "viscosity", "pressure_drop")}

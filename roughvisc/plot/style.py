@@ -128,6 +128,13 @@ def is_logarithmic(values: Any) -> bool:
     return bool(values.size and values.min() > 0 and values.max() >= _DECADES * values.min())
 
 
+def is_uneven(values: Any) -> bool:
+    """Return whether most values lie in the first thirtieth of their range, which begins at zero or above."""
+    known = np.asarray(values, dtype=float)
+    known = known[np.isfinite(known)]
+    return bool(known.size > 3 and known.min() >= 0 and 0 < np.median(known) < known.max() / _DECADES)
+
+
 def log_axis(axis: Axis, values: Any) -> None:
     """Make one axis logarithmic; zeros have a place of their own at its lower end.
 
@@ -176,9 +183,8 @@ def row_axis(axes: Sequence[Axes], rows: xr.DataArray) -> Unit:
     """
     label, si = described(rows)
     known = rows.values[np.isfinite(rows.values)]
-    is_uneven = known.size > 3 and known.min() >= 0 and 0 < np.median(known) < known.max() / _DECADES
-    unit = Unit(1.0, si) if is_uneven else unit_for(known, si)
-    if is_uneven or str(rows.name).endswith("speed"):
+    unit = Unit(1.0, si) if is_uneven(known) else unit_for(known, si)
+    if is_uneven(known) or str(rows.name).endswith("speed"):
         log_axis(axes[0].xaxis, unit(known))
     label_panels(axes, unit.label(label))
     return unit
