@@ -41,7 +41,15 @@ def view(result: Path, out: Path | None, no_open: bool) -> None:
 @click.argument("result", type=PATH)
 @click.option("--out", type=PATH, help="Folder for the figures. [default: folder of the result]")
 @click.option("--all", "every", is_flag=True, help="Draw every figure that the results allow.")
-def plot(result: Path, out: Path | None, every: bool) -> None:
+@click.option(
+    "--format",
+    "kind",
+    type=click.Choice(["png", "svg", "pdf"]),
+    default="png",
+    show_default=True,
+    help="Format of the files.",
+)
+def plot(result: Path, out: Path | None, every: bool, kind: str) -> None:
     """Draw figures of a result or a folder of results.
 
     Draws two figures of a result: history and maps, or friction curve and maps. Of a folder with several cases, draws
@@ -58,9 +66,9 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
 
     paths = results_at(result)
     together = results_of_sweep(result) if len(paths) > 1 else None
-    drawn = [] if together is None else save_sweep_figures(together, out or result)
+    drawn = [] if together is None else save_sweep_figures(together, out or result, kind=kind)
     if together is None or every:
-        drawn += save_figures_of_files(paths, out, every=every, processes=threads_each(1))
+        drawn += save_figures_of_files(paths, out, every=every, processes=threads_each(1), kind=kind)
     say_figures(screen(), drawn)
 
 
