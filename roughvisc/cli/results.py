@@ -85,9 +85,7 @@ def report(results: Path, out: Path | None) -> None:
     Example:
       roughvisc report results/focus_variation-study -o report.html
     """
-    from roughvisc.study.execution.cluster import threads_each
-
-    say_path(screen(), "Report", rv.report(results, out, processes=threads_each(1)))
+    say_path(screen(), "Report", rv.report(results, out))  # other processes would take longer to start
 
 
 @click.command()

@@ -59,6 +59,17 @@ def test_page__numbers_the_cases_as_their_table(folder, page):
 
 
 @pytest.mark.thorough
+def test_page__has_one_audit_for_cases_with_the_same_verdicts_and_links_the_page_to_explore(folder, tmp_path):
+    (tmp_path / "page.html").write_text("to explore")
+    text = report(folder, tmp_path / "report.html").read_text()
+    audit = text[text.index('id="audit"') : text.index('id="run"')]
+    assert re.findall("<h3>(.*?)</h3>", audit) == ["Cases 0, 1, 2"]
+    assert audit.count("<table") == 1
+    assert '<a href="page.html">' in text
+    assert "prefers-color-scheme: dark" in text
+
+
+@pytest.mark.thorough
 def test_page__escapes_what_users_write_and_needs_no_other_file(page):
     assert "default-src 'none'" in page
     assert not re.findall(r'(?:src|href)="(?!data:|#)', page)
