@@ -244,7 +244,7 @@
 
   // ---- size and colours
   function resize() {
-    const { width, height } = cases[chosen.case].plane, whole = element("map").clientWidth;
+    const { width, height } = cases[chosen.case].plane ?? { width: 1, height: 1 }, whole = element("map").clientWidth;
     const side = Math.max(120, whole - 75), up = Math.max(120, Math.min(Math.max(window.innerHeight - 310, 320), 900));
     const scale = Math.min(side / width, up / height);
     plots.map.setv({ frame_width: Math.max(60, Math.round(width * scale)), frame_height: Math.max(60, Math.round(height * scale)) });
