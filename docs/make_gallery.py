@@ -68,7 +68,8 @@ NOTEBOOK = "first_contact"
 
 def leaking(ds):
     """The result with the leak rate of water under 1 bar, as ``roughvisc run`` adds it."""
-    return ds.merge(rv.observables.leakage(ds, viscosity="1 mPa s", pressure_drop="1 bar"))
+    leak = rv.observables.leakage(ds, viscosity="1 mPa s", pressure_drop="1 bar")
+    return ds.assign(leak.data_vars)
 
 
 def run_notebook(path):
@@ -88,12 +89,7 @@ def run_notebook(path):
 def by_load(results):
     """One entry a case, named by its load."""
     loads = results["program_0_load"].values
-    surface = {"height": results.height} if "height" in results else {}
-    drop = [name for name in results.coords if name not in ("time", "x", "y")]
-    return {
-        f"{1e3 * load:g} mN": results.isel(case=i).drop_vars(drop).assign(surface)
-        for i, load in enumerate(loads)
-    }
+    return {f"{1e3 * load:g} mN": results.isel(case=i) for i, load in enumerate(loads)}
 
 
 def save_changed(figure, path, dpi):

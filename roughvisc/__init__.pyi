@@ -36,7 +36,7 @@ from roughvisc.mechanics.materials.tables import dynamic_table as dynamic_table
 from roughvisc.mechanics.materials.tables import relaxation_table as relaxation_table
 from roughvisc.mechanics.program import Program as Program
 from roughvisc.mechanics.sheet import sheet as sheet
-from roughvisc.reports.report import report as report
+from roughvisc.plot.report import report as report
 from roughvisc.runs.csv_files import to_csv as to_csv
 from roughvisc.runs.csv_files import to_table as to_table
 from roughvisc.runs.netcdf import open_result as open_result

@@ -1,4 +1,4 @@
-"""Ten layers: a file imports from its own part of the package and from layers below it."""
+"""Nine layers: a file imports from its own part of the package and from layers below it."""
 
 import ast
 import pathlib
@@ -18,7 +18,6 @@ LAYERS = (
     ("runs",),
     ("judge",),
     ("plot",),
-    ("reports",),
     ("__init__ __main__ api cli",),
 )
 PLACE = {name: (layer, part) for layer, parts in enumerate(LAYERS) for part in parts for name in part.split()}

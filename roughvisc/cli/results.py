@@ -1,7 +1,9 @@
-"""Commands on results: ``plot``, ``report``, ``table``, ``audit``, ``verify`` and ``clean``."""
+"""Commands on results: ``view``, ``plot``, ``report``, ``table``, ``audit``, ``verify`` and ``clean``."""
 
 from __future__ import annotations
 
+import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -25,9 +27,40 @@ class _AllFigures(click.Option):
 
 @click.command()
 @click.argument("result", type=PATH)
+@click.option("-o", "--out", type=PATH, help="Page to write. [default: page.html in the folder, or RESULT-page.html]")
+@click.option("--no-open", is_flag=True, help="Do not open the page in a browser.")
+def view(result: Path, out: Path | None, no_open: bool) -> None:
+    """Write a page to explore a result or a folder of results, and open it in a browser.
+
+    The page shows every field at all kept times or speeds, profiles and histories of all cases. It is one file that
+    needs neither a server nor the network.
+
+    \b
+    Example:
+      roughvisc view results/focus_variation-study
+    """
+    import webbrowser
+
+    path = rv.plot.page(result, out)
+    say_path(screen(), "Page", path)
+    has_screen = sys.platform in ("darwin", "win32") or {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys()
+    if has_screen and not no_open:  # without a screen a browser of text would take the terminal
+        webbrowser.open(path.absolute().as_uri())
+
+
+@click.command()
+@click.argument("result", type=PATH)
 @click.option("--out", type=PATH, help="Folder for the figures. [default: folder of the result]")
 @click.option("--all", "every", is_flag=True, cls=_AllFigures)
-def plot(result: Path, out: Path | None, every: bool) -> None:
+@click.option(
+    "--format",
+    "kind",
+    type=click.Choice(["png", "svg", "pdf"]),
+    default="png",
+    show_default=True,
+    help="Format of the files.",
+)
+def plot(result: Path, out: Path | None, every: bool, kind: str) -> None:
     """Draw figures of a result or a folder of results.
 
     Draws two figures of a result: history and maps, or friction curve and maps. Of a folder with several cases, draws
@@ -44,9 +77,9 @@ def plot(result: Path, out: Path | None, every: bool) -> None:
 
     paths = results_at(result)
     together = results_of_sweep(result) if len(paths) > 1 else None
-    drawn = [] if together is None else save_sweep_figures(together, out or result)
+    drawn = [] if together is None else save_sweep_figures(together, out or result, kind=kind)
     if together is None or every:
-        drawn += save_figures_of_files(paths, out, every=every, processes=threads_each(1))
+        drawn += save_figures_of_files(paths, out, every=every, processes=threads_each(1), kind=kind)
     say_figures(screen(), drawn)
 
 
@@ -63,9 +96,7 @@ def report(results: Path, out: Path | None) -> None:
     Example:
       roughvisc report results/focus_variation-study -o report.html
     """
-    from roughvisc.runs.cluster import threads_each
-
-    say_path(screen(), "Report", rv.report(results, out, processes=threads_each(1)))
+    say_path(screen(), "Report", rv.report(results, out))  # other processes would take longer to start
 
 
 @click.command()

@@ -128,7 +128,11 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, **op
     console.print(scan_table(height, measures, file.name), "", findings_table(found), "", sep="\n")
     say(console, surface_table(file, Path(), options, found.steps))
     if is_replaced or not picture.exists():
-        say_path(console, "Picture", write_figure(rv.plot.surface(levelled), picture, _MAKER))
+        say_path(
+            console,
+            "Picture",
+            write_figure(rv.plot.surface(levelled, cutoff=found.steps.get("filter")), picture, _MAKER),
+        )
     else:
         say_path(console, "Picture kept, because roughvisc scan did not make it", picture)
     if to:

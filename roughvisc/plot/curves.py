@@ -68,13 +68,15 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
     expect_result(dataset, over, *(names or default))
     kept = dataset.sortby(axis)
     steps = steps_of(kept) if axis == "time" else kept
-    columns, height = 1 if len(names) <= 3 else 2, 1.1 if len(names) > 2 else 1.7
-    figure, axes = style.new_panels(len(names), columns, (4.1 - 0.6 * columns, height), shared="x")
+    # an odd number of panels in two columns would leave a hole
+    columns, height = 2 if len(names) > 3 and len(names) % 2 == 0 else 1, 0.9 if len(names) > 2 else 1.7
+    figure, axes = style.new_panels(len(names), columns, (4.1 - 0.6 * columns, height), shared="x", left=0.85)
     across = style.row_axis(axes, (kept if steps is None or over not in steps else steps)[over])
     for ax, name in zip(axes, names, strict=True):
         line = kept if steps is not None and not {name, over} <= steps.variables.keys() else steps
         _draw_history(ax, name, line, kept, over, across)
     figure.align_ylabels()
+    style.letter(axes)
     style.legend_above(figure, style.named_in(*axes))
     return figure
 
@@ -95,9 +97,9 @@ def _draw_history(ax: Axes, name: str, steps: xr.Dataset | None, kept: xr.Datase
     across : Unit
         Unit of the horizontal axis.
     """
-    values, at = style.drawable(kept[name]), across(kept[over])
+    values, at = kept[name], across(kept[over])
     (label, si), colour = style.described(kept[name]), style.CONTACT if "contact" in name else style.BLUE
-    line = values if steps is None else style.drawable(steps[name])
+    line = values if steps is None else steps[name]
     unit, is_finer = unit_for(line, si), line.size > values.size
     if steps is not None:
         ax.plot(across(steps[over]), unit(line), color=colour, label="time steps" if is_finer else None)
@@ -111,8 +113,10 @@ def _draw_history(ax: Axes, name: str, steps: xr.Dataset | None, kept: xr.Datase
         )
     if f"persson_{name}" in kept:
         ax.plot(at, unit(kept[f"persson_{name}"]), "--", color="k", lw=0.9, label="Persson")
-    style.value_axis(ax, np.concatenate([one.get_ydata() for one in ax.lines]), unit)
-    ax.set_ylabel(unit.label(label + "\n" if len(label) > 14 else label).rstrip())
+    drawn = np.concatenate([one.get_ydata() for one in ax.lines])
+    style.value_axis(ax, drawn, unit, may_vanish=name == "leak_rate")
+    is_long = style.LETTER * len(unit.label(label)) > ax.get_position().height * ax.figure.get_figheight()
+    ax.set_ylabel(unit.label(label).replace(" [", "\n[") if is_long else unit.label(label))
 
 
 @style.apply
@@ -155,9 +159,11 @@ def area_against_load(results: xr.Dataset | Mapping[str, xr.Dataset], *, contact
     loads, areas = (np.concatenate([one[name] for one in lines.values()]) for name in ("force", "contact_area"))
     across, up = unit_for(loads, "N"), unit_for(areas, "m^2")
     figure, (ax,) = style.new_panels(1, 1, (3.4, 2.6), lines=0)
-    for label, one in lines.items():
-        look = {"marker": "o" if steps[label] is None or one["force"].size <= _DOTS else ""}
-        look["ls"] = "" if steps[label] is None else "-"
+    for (label, one), look in zip(lines.items(), style.distinct(len(lines)), strict=True):
+        if steps[label] is not None and one["force"].size > _DOTS:
+            look["markevery"] = one["force"].size // 8
+        if steps[label] is None:
+            look["ls"] = ""
         ax.plot(across(one["force"]), up(one["contact_area"]), label=style.verbatim(label), **look)
     if contact_modulus is not None and loads.max() > 0:
         named = contact_modulus if isinstance(contact_modulus, Mapping) else {"": contact_modulus}
@@ -208,8 +214,8 @@ def friction(dataset: xr.Dataset) -> Figure:
 def trade(dataset: xr.Dataset, quantity: str | None = None) -> Figure:
     """Draw wall time against error of every setting, with the Pareto front.
 
-    Each grid has a marker. Labels state the tolerances of the front. Errors below the uncertainty of the reference lie
-    in a grey band, and are not part of the front.
+    Each grid has a marker. Labels above the points state their tolerances. Errors below the uncertainty of the
+    reference lie in a grey band, and are not part of the front.
 
     Parameters
     ----------
@@ -247,9 +253,9 @@ def trade(dataset: xr.Dataset, quantity: str | None = None) -> Figure:
     low, high = ax.get_ylim()
     if unsure > low:
         ax.axhspan(low, unsure, color="0.93", zorder=0, label="reference uncertainty")
-    for place in zip(front["run_time"], front["error"], front["tolerance"], strict=True):
-        look = {"textcoords": "offset points", "fontsize": 6.5, "color": "0.25"}
-        ax.annotate(format_tolerance(place[2]), place[:2], (5, 3), **look)
+    for place in zip(table["run_time"], table["error"], table["tolerance"], strict=True):
+        look = {"textcoords": "offset points", "fontsize": 6.5, "color": "0.25", "ha": "center"}
+        ax.annotate(format_tolerance(place[2]), place[:2], (0, 4), **look)
     ax.set(ylim=(low, high), xlabel="Wall time [s]", ylabel=f"Error of {VARIABLES[quantity].label.lower()} [%]")
     style.legend_above(figure, style.named_in(ax))
     return figure

@@ -15,6 +15,7 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from roughvisc.arguments import listed_names, one_of
@@ -31,17 +32,19 @@ from roughvisc.units import Quantity, Unit, listed, quantities, unit_for
 from roughvisc.variables import AXES, FIELDS, VARIABLES, axis_of
 
 #: Field -> perceptually even colour map without the colour of contact; reduction of a block of cells to one drawn cell;
-#: colour and name of the values below the scale, which are zero or, for the flux, small. Pressure and flux darken as
-#: they rise.
-_LOOK = {
+#: colour and name of the values below the scale, which are zero or, for the flux, small. Pressure, gap and flux darken
+#: as they rise.
+LOOK = {
     "pressure": ("viridis_r", "max", style.NO_CONTACT, "no contact"),
-    "gap": ("cividis", "min", style.CONTACT, "contact"),
+    "gap": ("cividis_r", "min", style.CONTACT, "contact"),
     "displacement": ("viridis", "mean", None, ""),
     "flux": ("cividis_r", "max", style.NO_CONTACT, "below 0.1 % of the scale"),
     "height": ("cividis", "mean", None, ""),
 }
 #: Largest number of drawn cells along the longer side, and of times or speeds in one figure.
 MOST_CELLS, _MOST_FRAMES = 1024, 8
+#: Flux that stands for zero. [m^2/s]
+_NO_FLOW = 1e-300
 #: Part of the positive values within a colour scale [%], unless the largest value is less than this times larger.
 _SHOWN, _SPIKE = 99.8, 1.2
 
@@ -88,29 +91,49 @@ def largest_row(dataset: xr.Dataset) -> int:
 
 
 def representative_frames(dataset: xr.Dataset) -> list[int]:
-    """Return up to four rows, evenly spread and among them the one with the largest contact or friction."""
-    order = dataset[axis_of(dataset.variables)].values.argsort()
-    spread, largest = np.linspace(0, order.size - 1, 4).round().astype(int), order.argsort()[largest_row(dataset)]
+    """Return up to four rows with contact, between which the contact area changes by equal parts.
+
+    The row with the largest contact or friction is among them. Rows over speed are evenly spread. Of a leaking fluid
+    they are three rows with a leak and the first closed one.
+    """
+    axis = axis_of(dataset.variables)
+    order = dataset[axis].values.argsort()
+    if "flux" in dataset and "leak_rate" in dataset:
+        leaks = dataset["leak_rate"].values[order] > 0
+        leaking, closed = order[leaks], order[~leaks]
+        spread = np.unique(np.linspace(0, leaking.size - 1, 3).round().astype(int)) if leaking.size else []
+        return [*leaking[spread].tolist(), *closed[:1].tolist()]
+    area = np.nan_to_num(dataset["contact_area"].values[order]) if "contact_area" in dataset else np.zeros(order.size)
+    if (area > 0).any():
+        order, area = order[area > 0], area[area > 0]
+    change = np.append(0.0, np.abs(np.diff(area)).cumsum())
+    if axis == "speed" or not change[-1] > 0:
+        change = np.arange(order.size)
+    spread = np.abs(change - np.linspace(0, change[-1], 4)[:, None]).argmin(axis=1)
+    largest = int(np.flatnonzero(order == largest_row(dataset))[0])
     spread[np.abs(spread - largest).argmin()] = largest
     return order[np.unique(spread)].tolist()
 
 
-def frame_of(dataset: xr.Dataset, name: str, frame: int) -> xr.DataArray:
-    """Return one frame of a field to draw; the gap in contact is exactly zero."""
-    at = dataset.isel({axis_of(dataset.variables): frame})
-    field = at[name] if "height" not in at else at[name].where(at["height"].notnull())
-    if name == "gap" and "pressure" in at:
-        field = field.where(at["pressure"].isnull() | (at["pressure"] <= 0), 0.0)
-    return drawn(field.rename(name))
+def frame_of(dataset: xr.Dataset, name: str, frame: int, cells: int | None = None) -> xr.DataArray:
+    """Return one frame of a field to draw, of at most some cells a side; the gap in contact is exactly zero."""
+    row = {axis_of(dataset.variables): frame}
+    field = dataset[name].isel(row).transpose("x", "y")
+    values = field.values
+    if "height" in dataset:
+        values = np.where(dataset["height"].transpose("x", "y").notnull(), values, np.nan)
+    if name == "gap" and "pressure" in dataset:
+        values = np.where(dataset["pressure"].isel(row).transpose("x", "y") > 0, 0.0, values)
+    return drawn(field.copy(data=values).rename(name), cells)
 
 
-def drawn(field: xr.DataArray) -> xr.DataArray:
+def drawn(field: xr.DataArray, cells: int | None = None) -> xr.DataArray:
     """Return the map to draw: for a large one, blocks of cells with their largest pressure and smallest gap."""
-    every = -(-max(field.sizes["x"], field.sizes["y"]) // MOST_CELLS)
+    every = -(-max(field.sizes["x"], field.sizes["y"]) // (cells or MOST_CELLS))
     if every > 1:
         blocks = field.coarsen(x=every, y=every, boundary="pad", coord_func="min")
         to_centre = {axis: (every - 1) / 2 * side for axis, side in zip("xy", spacing(field), strict=True)}
-        field = getattr(blocks, _LOOK[str(field.name)][1])()
+        field = getattr(blocks, LOOK.get(str(field.name), LOOK["displacement"])[1])()
         field = field.assign_coords({axis: field[axis] + shift for axis, shift in to_centre.items()})
     return field.load()
 
@@ -127,20 +150,51 @@ def map_size(field: xr.DataArray | xr.Dataset, width: float, height: float) -> t
     return min(width, height / ratio), min(height, width * ratio)
 
 
-def colour_scale(name: str, frames: Iterable[xr.DataArray]) -> tuple[Unit, Normalize]:
-    """Return unit and colour scale of a field at some rows; few values far beyond all others are above the scale."""
-    begins_at_zero, ends = _LOOK[name][2] is not None, []
+def scale_ends(name: str, frames: Iterable[xr.DataArray]) -> tuple[float, float, float]:
+    """Return the smallest value of a field at some rows, the upper end of its scale, and the largest value. [SI]
+
+    Few values far beyond all others are above the scale. Fields that begin at zero count where they are positive.
+    """
+    begins_at_zero, ends = LOOK.get(name, LOOK["displacement"])[2] is not None, []
     for frame in frames:
         known = frame.values[frame.values > 0 if begins_at_zero else np.isfinite(frame.values)]
         if known.size:
             ends.append(np.percentile(known, (0, _SHOWN, 100)))
     lowest, high, most = np.transpose(ends or [(0.0, 1.0, 1.0)])
     high = most.max() if most.max() < _SPIKE * high.max() else high.max()
-    unit = unit_for([lowest.min(), high], VARIABLES[name].units)
-    low, high = float(unit(lowest.min())), float(unit(high))
+    return float(lowest.min()), float(high), float(most.max())
+
+
+def colour_scale(name: str, frames: Iterable[xr.DataArray]) -> tuple[Unit, Normalize]:
+    """Return unit and colour scale of a field at some rows."""
+    begins_at_zero = LOOK[name][2] is not None
+    lowest, high, most = scale_ends(name, frames)
+    unit = unit_for([lowest, high], VARIABLES[name].units)
+    low, high = float(unit(lowest)), float(unit(high))
     if name == "flux":
+        high = high if most > _NO_FLOW else 1.0  # nothing flows: all is below the scale
         return unit, LogNorm(1e-3 * high, high)
     return unit, Normalize(1e-12 * high if begins_at_zero else low, high)
+
+
+def contact_of(dataset: xr.Dataset, frame: int) -> xr.DataArray | None:
+    """Return the drawn cells in contact, 1 or 0, at one row; None if the result has neither pressure nor gap."""
+    for name in ("pressure", "gap"):
+        if name in dataset:
+            field = frame_of(dataset, name, frame)
+            is_touching = field > 0 if name == "pressure" else field <= 0
+            return is_touching.astype(float).transpose("y", "x")
+    return None
+
+
+def draw_outline(ax: Axes, contact: xr.DataArray | None) -> None:
+    """Draw a thin dark line around the contact, in proportion to the cells, so that small spots keep their colour."""
+    if contact is None or not 0 < contact.mean() < 1:
+        return
+    plane = plane_unit(contact)
+    width = ax.get_position().width * ax.figure.get_figwidth() * 72 / contact.sizes["x"]  # of a cell [pt]
+    x, y = plane(contact["x"]), plane(contact["y"])
+    ax.contour(x, y, contact, [0.5], colors=style.OUTLINE, linewidths=float(np.clip(0.4 * width, 0.04, 0.5)))
 
 
 def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, norm: Normalize) -> AxesImage:
@@ -157,7 +211,7 @@ def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, norm: Normalize) -> Axes
     norm : matplotlib.colors.Normalize
         Colour scale, in this unit.
     """
-    plane, (colours, _, below, _) = plane_unit(field), _LOOK[str(field.name)]
+    plane, (colours, _, below, _) = plane_unit(field), LOOK[str(field.name)]
     x, y = map(plane, cell_edges(field))
     bad = style.CONTACT if field.name == "flux" else style.MISSING
     values, extent = np.ma.masked_invalid(unit(field.transpose("y", "x"))), (x[0], x[-1], y[0], y[-1])
@@ -168,35 +222,48 @@ def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, norm: Normalize) -> Axes
     return image
 
 
-def _draw_field(axes: Sequence[Axes], dataset: xr.Dataset, name: str, frames: Sequence[int]) -> dict[str, Patch]:
-    """Draw one field at some rows on one colour scale; return the entries of its legend."""
+def _draw_field(
+    axes: Sequence[Axes], dataset: xr.Dataset, name: str, frames: Sequence[int], *, each: bool = False
+) -> dict[str, Patch]:
+    """Draw one field at some rows on one colour scale, or on one each; return the entries of its legend."""
     shown = [frame_of(dataset, name, frame) for frame in frames]
-    unit, norm = colour_scale(name, shown)
-    for ax, one in zip(axes, shown, strict=True):
-        image = draw_map(ax, one, unit, norm)
-    values, named, (_, _, below, word) = unit(np.concatenate(shown)), {}, _LOOK[name]
-    if below and (values < norm.vmin).any():
-        named[word] = Patch(facecolor=below, edgecolor="0.5", lw=0.4)
-    if np.isnan(values).any():
-        label, colour = ("contact", style.CONTACT) if name == "flux" else ("missing", style.MISSING)
-        named[label] = Patch(color=colour)
-    extend = "max" if np.nanmax(values) > norm.vmax else "neither"
-    style.colour_bar(image, axes, unit.label(VARIABLES[name].label), extend=extend)
+    named, (_, _, below, word) = {}, LOOK[name]
+    for group in [[i] for i in range(len(shown))] if each else [range(len(shown))]:
+        fields = [shown[i] for i in group]
+        unit, norm = colour_scale(name, fields)
+        for i, field in zip(group, fields, strict=True):
+            image = draw_map(axes[i], field, unit, norm)
+            draw_outline(axes[i], contact_of(dataset, frames[i]))
+        values = unit(np.concatenate(fields))
+        if below and (values < norm.vmin).any():
+            named[word] = Patch(facecolor=below, edgecolor="0.5", lw=0.4)
+        if np.isnan(values).any():
+            label, colour = ("contact", style.CONTACT) if name == "flux" else ("missing", style.MISSING)
+            named[label] = Patch(color=colour)
+        known = values[np.isfinite(values)]
+        extend = "max" if known.size and known.max() > norm.vmax else "neither"
+        if not (name == "flux" and known.size and known.max() < norm.vmin):  # nothing flows
+            style.colour_bar(image, [axes[i] for i in group], unit.label(VARIABLES[name].label), extend=extend)
     return named
 
 
-def frame_title(dataset: xr.Dataset, frame: int) -> str:
-    """Return the time or the speed of a row as text."""
+def frame_title(dataset: xr.Dataset, frame: int, *, with_leak: bool = False) -> str:
+    """Return the time or the speed of a row as text, with the leak rate if requested and known."""
     axis = axis_of(dataset.variables)
-    return AXES[axis].place(float(dataset[axis][frame]), 3)
+    title = AXES[axis].place(float(dataset[axis][frame]), 3)
+    if with_leak and "leak_rate" in dataset:
+        leak = float(dataset["leak_rate"][frame])
+        title += f": {unit_for([leak], 'm^3/s').text(leak)}" if leak else ": closed, no leak"
+    return title
 
 
 @style.apply
 def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = ("pressure", "gap")) -> Figure:
     """Draw maps of fields at some times or speeds, with one colour scale for each field.
 
-    Cells without contact are light blue on a map of the pressure. Cells in contact are orange on maps of the gap and of
-    the flux. Above 1024 cells a side, one drawn cell
+    All fields darken as they rise, and a thin dark line encloses the contact. Cells without contact are light blue on a
+    map of the pressure. Cells in contact are orange on maps of the gap and of the flux. Maps over speed and of the flux
+    have a scale each, because they span decades. Above 1024 cells a side, one drawn cell
     shows the largest pressure and flux, and the smallest gap, of a block of cells. The colour scale may leave out two
     of a thousand values, marked by an arrow at the colour bar. The flux has a logarithmic scale of three decades.
 
@@ -206,8 +273,9 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
         One case's result; if its fields are on Dask, only the drawn frames are loaded.
     times : list of float or str, str or int, optional
         Times [s] or speeds [m/s], as a list or one text with a unit; the nearest kept ones are drawn. Negative whole
-        numbers, also a single one, count from the end. Default: up to four, evenly spread, among them the time of the
-        largest contact or the speed of the largest friction.
+        numbers, also a single one, count from the end. Default: up to four with contact, between which the
+        contact area changes by equal parts, or evenly spread speeds; among them the time of the largest contact or the
+        speed of the largest friction.
     fields : sequence of str, or str
         Any of ``"pressure"``, ``"gap"``, ``"displacement"``; fields that are not in the result are skipped. Or
         ``"flux"`` of a leaking fluid, computed from the gap with the settings of ``leak_rate`` in the result, else
@@ -230,31 +298,45 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
         one_of("fields", name, (*FIELDS, "flux"))
     if "flux" in fields:
         expect_result(dataset, "gap")
-        dataset = dataset.assign(flux=_flux_of(dataset))
+        dataset = dataset.assign(flux=flux_of(dataset))
     stored = [name for name in fields if name in dataset]
     expect_result(dataset, *(stored or fields))
     frames = representative_frames(dataset) if times is None else frames_at(dataset, times)
-    columns = count = len(frames)
-    size = map_size(dataset, max(1.3, 2.9 - 0.45 * count), 3.25)
+    count = len(frames)
+    has_own_scales = axis_of(dataset.variables) == "speed" or "flux" in stored  # over decades of pressure or flux
+    columns = min(count, 2) if has_own_scales else count
+    size = map_size(dataset, 2.0 if has_own_scales else max(1.3, 2.9 - 0.45 * count), 3.25)
+    room, named = {"between": max(0.3, 1.5 - size[0]), "right": style.BAR}, {}
+    if has_own_scales:
+        room["between"] = style.BAR + 0.15
     if size[0] > 3 * size[1]:  # strips are stacked
         columns, size = 1, map_size(dataset, 4.5, 4.0)
-    room, named = {"between": max(0.3, 1.5 - size[0]), "right": style.BAR}, {}
-    figure, panels = style.new_panels(count * len(stored), columns, size, shared="xy", **room)
-    for number, name in enumerate(stored):
-        named |= _draw_field(panels[number * count :][:count], dataset, name, frames)
-    for ax, frame in zip(panels, frames * len(stored), strict=True):
-        ax.set_title(frame_title(dataset, frame))
+    rows = -(-count // columns)
+    figure, panels = style.new_panels(rows * columns * len(stored), columns, size, shared="xy", **room)
+    used = [panels[number * rows * columns :][:count] for number in range(len(stored))]
+    for axes in used:
+        for ax in axes[-columns:]:  # also above an empty place
+            ax.tick_params(labelbottom=axes is used[-1])
+    for name, axes in zip(stored, used, strict=True):
+        named |= _draw_field(axes, dataset, name, frames, each=has_own_scales)
+        for ax, frame in zip(axes, frames, strict=True):
+            ax.set_title(frame_title(dataset, frame, with_leak=name == "flux"))
+    filled = [ax for axes in used for ax in axes]
+    for ax in panels:
+        if ax not in filled:
+            ax.remove()
+    style.letter(filled)
     style.legend_above(figure, named)
     return figure
 
 
-def _flux_of(dataset: xr.Dataset) -> xr.DataArray:
+def flux_of(dataset: xr.Dataset) -> xr.DataArray:
     """Return the magnitude of the flux over (time, x, y), missing in contact; each frame is computed when drawn."""
     stated = dataset["leak_rate"].attrs if "leak_rate" in dataset else {}
     options = {name: value for name, value in stated.items() if name in ("along", "viscosity", "pressure_drop")}
     gap = dataset[["gap"]].chunk({axis_of(dataset.variables): 1, "x": -1, "y": -1}).assign_attrs(dataset.attrs)
     found = leakage(gap, flow=True, **options)
-    size = np.hypot(found["flux_x"], found["flux_y"]).clip(1e-300)  # zero has no logarithm
+    size = np.hypot(found["flux_x"], found["flux_y"]).clip(_NO_FLOW)  # zero has no logarithm
     return size.where(gap["gap"] > 0)
 
 
@@ -292,6 +374,7 @@ def section(dataset: xr.Dataset, time: Any = None, axis: str = "x", at: Quantity
     plane, pressure, unit = plane_unit(dataset), unit_for(cut["pressure"], "Pa"), unit_for(surface - height.min(), "m")
     edges, x = plane(cell_edges(dataset)["xy".index(axis)]), plane(dataset[axis])
     figure, (top, bottom) = style.new_panels(2, 1, (4.1, 1.4), shared="x")
+    style.letter([top, bottom])
     top.stairs(pressure(cut["pressure"]), edges, fill=True, fc=(0, 0.62, 0.45, 0.3), ec=style.GREEN, lw=1)
     top.set(ylim=(0, None), ylabel=pressure.label("Pressure"))
     bottom.plot(x, unit(height), color="0.25", lw=1)
@@ -304,6 +387,10 @@ def section(dataset: xr.Dataset, time: Any = None, axis: str = "x", at: Quantity
     bottom.set(xlim=(edges[0], edges[-1]), ylim=(low, high), xlabel=plane.label(axis), ylabel=unit.label("Height"))
     place = f"{across} = {plane.text(float(dataset[across][index]))}"
     top.set_title(f"{AXES[rows].place(float(whole[rows]), 3)},  {place}")
+    box, inches = bottom.get_position(), figure.get_size_inches()
+    up = box.height * inches[1] / (unit.factor * (high - low))
+    along = box.width * inches[0] / (plane.factor * (edges[-1] - edges[0]))
+    bottom.set_title(f"heights enlarged {up / along:.3g} times", fontsize=8)
     figure.align_ylabels()
     style.legend_above(figure, style.named_in(bottom))
     return figure
@@ -359,14 +446,17 @@ def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, rate: Q
 
 
 @style.apply
-def surface(height: xr.DataArray | xr.Dataset) -> Figure:
+@quantities(cutoff="m > 0")
+def surface(height: xr.DataArray | xr.Dataset, cutoff: Quantity | None = None) -> Figure:
     """Draw a surface: map, profile through its middle, distribution of heights, power spectrum.
 
     Parameters
     ----------
     height : xarray.DataArray, dims (x, y), or a Dataset with the variable ``height``
-        Heights, peaks up; missing points are grey. The colour scale covers 98 % of the heights, so that a spike
-        does not flatten the rest. [m]
+        Heights, peaks up; missing points are grey. Map and profile cover 98 % of the heights and their range on both
+        sides, so that a spike does not flatten the rest; a title states heights beyond. [m]
+    cutoff : float or str, optional
+        Wavelength below which the heights are noise, such as the nesting index of a filter; marked in the spectrum. [m]
 
     Returns
     -------
@@ -385,27 +475,37 @@ def surface(height: xr.DataArray | xr.Dataset) -> Figure:
     low, high = np.nanpercentile(height, (1, 99))
     unit, plane = unit_for([low, high], "m"), plane_unit(height)
     along_x, along_y = map(np.ptp, cell_edges(height))
-    figure, axes = style.new_panels(4, 2, (2.4, 2.4 * float(np.clip(along_y / along_x, 0.6, 1.6))), between=1.65)
+    size = 2.6, 2.6 * float(np.clip(along_y / along_x, 0.6, 1.6))
+    figure, axes = style.new_panels(4, 2, size, between=1.75)
     on_map, profile, heights, spectrum = axes
+    style.letter(axes)
     image = draw_map(on_map, drawn(height), unit, Normalize(float(unit(low)), float(unit(high))))
     style.colour_bar(image, [on_map], unit.label("Height"), extend="both")
     line = height.isel(y=height.sizes["y"] // 2)
     profile.plot(plane(line["x"]), unit(line), lw=0.9)
     on_map.axhline(plane(line["y"]), color="w", lw=0.8, ls=(0, (4, 2)))
-    profile.set_title(f"y = {plane.text(float(line['y']))}")
+    ends = unit([2 * low - high, 2 * high - low]) if high > low else unit([low - 1e-9, high + 1e-9])
+    shown = unit(line)
+    beyond = np.nanmin(shown) < ends[0] or np.nanmax(shown) > ends[1] if np.isfinite(shown).any() else False
+    if beyond:
+        profile.set_ylim(*ends)
+    profile.set_title(f"y = {plane.text(float(line['y']))}{', spikes cut off' if beyond else ''}")
     profile.set(xlabel=plane.label("x"), ylabel=unit.label("Height"))
     levelled = off_plane(height)
     known = levelled.values[np.isfinite(levelled.values)]
     low, high = np.percentile(known, (1, 99))
     unit, ends = unit_for([low, high], "m"), np.array([1.5 * low - 0.5 * high, 1.5 * high - 0.5 * low])
     heights.hist(unit(known), int(np.clip(known.size**0.5 / 2, 8, 100)), range=unit(ends), density=True, alpha=0.5)
-    heights.set_title(f"Sq = {unit.text(known.std())}")
+    outside = np.mean((known < ends[0]) | (known > ends[1])) if high > low else 0.0
+    heights.set_title(f"Sq = {unit.text(known.std())}{f', {100 * outside:.2g} % beyond' if outside else ''}")
     heights.set(xlabel=unit.label("Height, levelled"), ylabel=f"Density [1/{unit.symbol}]")
-    _draw_spectrum(spectrum, levelled)
+    for axis in (profile.xaxis, profile.yaxis, heights.xaxis, on_map.xaxis):
+        axis.set_major_locator(MaxNLocator(5))
+    _draw_spectrum(spectrum, levelled, cutoff)
     return figure
 
 
-def _draw_spectrum(ax: Axes, levelled: xr.DataArray) -> None:
+def _draw_spectrum(ax: Axes, levelled: xr.DataArray, cutoff: float | None) -> None:
     """Draw the radial power spectral density of the levelled heights, up to the lower limit of both axes."""
     if min(levelled.shape) >= 8 and float(levelled.std()) > 0:
         gaps = bool(levelled.isnull().any())
@@ -417,4 +517,9 @@ def _draw_spectrum(ax: Axes, levelled: xr.DataArray) -> None:
         style.log_axis(ax.xaxis, q)
         style.log_axis(ax.yaxis, density)
         ax.set_title("missing points filled" if gaps else "")
+        if cutoff is not None:
+            noise = 2e-6 * np.pi / cutoff
+            ax.axvspan(noise, max(float(q.max()), noise), color="0.9", lw=0, zorder=0)
+            ax.axvline(noise, color=style.CONTACT, lw=1, ls=(0, (4, 2)))
+            ax.set_title(f"grey: noise, below {unit_for([cutoff], 'm').text(cutoff)}")
     ax.set(xlabel="Wavevector [rad/µm]", ylabel="Power spectral density\n[µm⁴]")

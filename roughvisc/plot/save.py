@@ -40,7 +40,7 @@ FIGURES: dict[str, tuple[Callable[[xr.Dataset], Figure], tuple[str, ...], str]] 
     "surface": (surface, ("height",), "Surface after conditioning."),
 }
 #: Resolution of pictures. [1/inch]
-DPI = 150
+DPI = 200
 #: Key of the metadata that names the program which made a picture, by format.
 _MAKER = {"png": "Software", "pdf": "Creator", "svg": "Creator"}
 #: Figures that are drawn unless all are requested.
@@ -86,7 +86,9 @@ def is_made_by(path: Path, maker: str) -> bool:
     return path.is_file() and maker.encode() in path.read_bytes()
 
 
-def save_figures(dataset: xr.Dataset, folder: Any, stem: str, names: Collection[str] | None = None) -> list[Path]:
+def save_figures(
+    dataset: xr.Dataset, folder: Any, stem: str, names: Collection[str] | None = None, *, kind: str = "png"
+) -> list[Path]:
     """Write the figures that the variables of a result allow, as ``STEM-history.png`` and so on.
 
     Parameters
@@ -99,6 +101,8 @@ def save_figures(dataset: xr.Dataset, folder: Any, stem: str, names: Collection[
         First part of every file name.
     names : collection of str, optional
         Only these figures, such as ``["history", "maps"]``.
+    kind : {"png", "svg", "pdf"}
+        Format of the files.
 
     Returns
     -------
@@ -113,14 +117,14 @@ def save_figures(dataset: xr.Dataset, folder: Any, stem: str, names: Collection[
     dataset = expect_result(dataset)
     folder = path_of(folder, "folder")
     figures = figures_of(dataset, names)
-    written = [write_figure(figure, folder / f"{stem}-{name}.png") for name, _, figure in figures]
+    written = [write_figure(figure, folder / f"{stem}-{name}.{kind}") for name, _, figure in figures]
     if not written:
         raise InputError(f"the result allows no figure: it holds {', '.join(map(str, dataset.variables))}")
     return written
 
 
 def save_figures_of_files(
-    paths: Sequence[Path], folder: Path | None, *, every: bool = True, processes: int = 1
+    paths: Sequence[Path], folder: Path | None, *, every: bool = True, processes: int = 1, kind: str = "png"
 ) -> list[Path]:
     """Write the figures of result files, in parallel and with a progress bar.
 
@@ -135,6 +139,8 @@ def save_figures_of_files(
         figures.
     processes : int
         Number of processes. Several processes need a main module that may be imported again.
+    kind : {"png", "svg", "pdf"}
+        Format of the files.
     """
     cases: dict[str, Any] = {}
     for path in paths:
@@ -144,7 +150,7 @@ def save_figures_of_files(
     for path in paths:
         known, with_surface = FIGURES if every else DEFAULT, not jobs or varies_surface(cases[path.stem])
         names = [name for name in known if name != "surface" or with_surface]
-        jobs.append((path, folder or path.parent, stems.get(path.stem, path.stem), names))
+        jobs.append((path, folder or path.parent, stems.get(path.stem, path.stem), names, kind))
     return [one for written in in_parallel(_save_file, jobs, processes, "drawing") for one in written]
 
 
@@ -153,9 +159,10 @@ def varies_surface(case: Mapping[str, Any]) -> bool:
     return any(key.startswith("surface.") for key in case.get("varied", {}))
 
 
-def _save_file(job: tuple[Path, Path, str, Collection[str]]) -> list[Path]:
-    with open_result(job[0]) as dataset:
-        return save_figures(dataset, *job[1:])
+def _save_file(job: tuple[Path, Path, str, Collection[str], str]) -> list[Path]:
+    path, folder, stem, names, kind = job
+    with open_result(path) as dataset:
+        return save_figures(dataset, folder, stem, names, kind=kind)
 
 
 def in_parallel(work: Callable[[Any], Any], jobs: Sequence[Any], processes: int, label: str) -> list[Any]:
@@ -183,7 +190,7 @@ def results_of_sweep(folder: Path) -> xr.Dataset | None:
     return None
 
 
-def save_sweep_figures(results: xr.Dataset, folder: Any) -> list[Path]:
+def save_sweep_figures(results: xr.Dataset, folder: Any, *, kind: str = "png") -> list[Path]:
     """Write the figures of a sweep, as ``sweep-contact_area.png``, ``sweep-approach.png`` and so on.
 
     Parameters
@@ -192,6 +199,8 @@ def save_sweep_figures(results: xr.Dataset, folder: Any) -> list[Path]:
         Result of :func:`roughvisc.open_results`.
     folder : path-like
         Folder for the files; created if absent.
+    kind : {"png", "svg", "pdf"}
+        Format of the files.
 
     Returns
     -------
@@ -204,4 +213,4 @@ def save_sweep_figures(results: xr.Dataset, folder: Any) -> list[Path]:
         If the Dataset does not hold several cases.
     """
     folder = path_of(folder, "folder")
-    return [write_figure(figure, folder / f"sweep-{name}.png") for name, _, figure in sweep_figures(results)]
+    return [write_figure(figure, folder / f"sweep-{name}.{kind}") for name, _, figure in sweep_figures(results)]

@@ -13,7 +13,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator
+from matplotlib.ticker import FixedLocator, LogLocator
 from matplotlib.transforms import Bbox
 
 from roughvisc.errors import printable
@@ -26,8 +26,12 @@ STYLE = matplotlib.rc_params_from_file(Path(__file__).with_name("roughvisc.mplst
 BLUE, VERMILION, GREEN = "#0072b2", "#d55e00", "#009e73"
 #: Contact in all figures; cells without contact on a map of the pressure; missing cells.
 CONTACT, NO_CONTACT, MISSING = VERMILION, "#dceaf5", "0.72"
+#: Line around the contact on maps.
+OUTLINE = "#1d2328"
 #: Mean width of a letter of 8 points, and height of a line of text. [inch]
 LETTER, _LINE = 0.066, 0.16
+#: Markers and dashes of lines that are told apart without colours.
+_MARKERS, _DASHES = "os^DvPX*", ("-", (0, (5, 1.5)), (0, (6, 1.5, 1, 1.5)), (0, (1.5, 1.2)))
 #: Width of a colour bar with its labels. [inch]
 BAR = 1.0
 #: Ratio of the largest to the smallest value from which an axis is logarithmic.
@@ -85,6 +89,28 @@ def new_panels(
     return figure, axes
 
 
+def distinct(count: int) -> list[dict[str, Any]]:
+    """Return looks of some lines that differ in marker, dash and width, besides their colour.
+
+    Later lines are thinner, so that lines with equal values stay visible. Many lines differ in colour alone.
+    """
+    if not 1 < count <= len(_MARKERS):
+        return [{"marker": "o" if count == 1 else "", "ls": "-"} for _ in range(count)]
+    looks = []
+    for i, marker in enumerate(_MARKERS[:count]):
+        left = 1 - i / (count - 1)
+        width, size = 1.2 + 0.9 * left, 3.2 + 2.0 * left
+        face = {} if i % 2 == 0 else {"mfc": "w"}
+        looks.append({"marker": marker, "ls": _DASHES[i % len(_DASHES)], "lw": width, "ms": size, **face})
+    return looks
+
+
+def letter(axes: Sequence[Axes]) -> None:
+    """Name several panels by letters at their upper right corners."""
+    for name, ax in zip("abcdefghijklmnop", axes if len(axes) > 1 else (), strict=False):
+        ax.set_title(name, loc="right", fontweight="bold")
+
+
 def label_panels(axes: Sequence[Axes], x: str = "", y: str = "") -> None:
     """Label the horizontal axes, the vertical axes, or both, of the panels that show their numbers."""
     for ax in axes:
@@ -127,16 +153,18 @@ def named_in(*axes: Axes) -> dict[str, Artist]:
     return {label: one for ax in axes for one, label in zip(*ax.get_legend_handles_labels(), strict=True)}
 
 
-def drawable(values: Any) -> Any:
-    """Return an array or a column without values that an axis cannot show, such as zero on the one of the leak rate."""
-    return values.where(np.isfinite(values) & ((values > 0) | (values.name != "leak_rate")))
-
-
 def is_logarithmic(values: Any) -> bool:
     """Return whether all values are positive and the largest is at least thirty times the smallest."""
     values = np.asarray(values, dtype=float)
     values = values[np.isfinite(values)]
     return bool(values.size and values.min() > 0 and values.max() >= _DECADES * values.min())
+
+
+def is_uneven(values: Any) -> bool:
+    """Return whether most values lie in the first thirtieth of their range, which begins at zero or above."""
+    known = np.asarray(values, dtype=float)
+    known = known[np.isfinite(known)]
+    return bool(known.size > 3 and known.min() >= 0 and 0 < np.median(known) < known.max() / _DECADES)
 
 
 def log_axis(axis: Axis, values: Any) -> None:
@@ -150,19 +178,28 @@ def log_axis(axis: Axis, values: Any) -> None:
     set_scale = getattr(axis.axes, f"set_{axis.axis_name}scale")
     if (values == 0).any():
         set_scale("symlog", linthresh=10.0 ** np.floor(np.log10(low)))
-        axis.get_major_locator().set_params(numticks=6)
+        axis.get_major_locator().set_params(numticks=6 if axis.axis_name == "x" else 4)
     else:
         set_scale("log")
-        axis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 100 * low else (1,)))
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5) if high < 100 * low else (1,), numticks=8))
     if high < 1000 * low:
         axis.set_major_formatter("{x:g}")
+    decades = np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
+    between = np.arange(1, 10) if decades.size <= 6 else np.ones(1)
+    axis.set_minor_locator(FixedLocator((10.0 ** decades[:, None] * between).ravel()))
     axis.set_minor_formatter("")
 
 
-def value_axis(ax: Axes, values: Any, unit: Unit) -> None:
-    """Scale the vertical axis for some values: logarithmic if they have a unit and span decades, else with zero."""
-    if unit.symbol and is_logarithmic(values):
+def value_axis(ax: Axes, values: Any, unit: Unit, *, may_vanish: bool = False) -> None:
+    """Scale the vertical axis for some values: logarithmic if they have a unit and span decades, else with zero.
+
+    Values that may vanish, such as a leak rate, have a place for zero on a logarithmic axis.
+    """
+    values = np.asarray(values, dtype=float)
+    if unit.symbol and is_logarithmic(values[values > 0] if may_vanish else values):
         log_axis(ax.yaxis, values)
+        if may_vanish and (values == 0).any():
+            ax.text(0.02, 0.0, "0: no leak", transform=ax.get_yaxis_transform(), va="bottom", fontsize=7)
     else:
         ax.update_datalim([(0.0, 0.0)], updatex=False)
         ax.autoscale_view(scalex=False)
@@ -187,9 +224,8 @@ def row_axis(axes: Sequence[Axes], rows: xr.DataArray) -> Unit:
     """
     label, si = described(rows)
     known = rows.values[np.isfinite(rows.values)]
-    is_uneven = known.size > 3 and known.min() >= 0 and 0 < np.median(known) < known.max() / _DECADES
-    unit = Unit(1.0, si) if is_uneven else unit_for(known, si)
-    if is_uneven or str(rows.name).endswith("speed"):
+    unit = Unit(1.0, si) if is_uneven(known) else unit_for(known, si)
+    if is_uneven(known) or str(rows.name).endswith("speed"):
         log_axis(axes[0].xaxis, unit(known))
     label_panels(axes, unit.label(label))
     return unit

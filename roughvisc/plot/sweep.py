@@ -15,12 +15,12 @@ from matplotlib.figure import Figure
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
-from roughvisc.labels import ATTRIBUTES
+from roughvisc.labels import ATTRIBUTES, steps_of
 from roughvisc.plot import style
 from roughvisc.plot.fields import rows_at
 from roughvisc.study.case_text import names_of, value_text
 from roughvisc.study.sweep_table import ITSELF, REALISATION, statistics
-from roughvisc.variables import AXES, CONDUCTANCES, ROW, ROWS, VARIABLES, axis_of
+from roughvisc.variables import AXES, CONDUCTANCES, ROW, ROWS, STEPPED, VARIABLES, axis_of
 
 #: Largest number of panels, and of values of a key in a legend.
 _MOST_PANELS, _MOST_NAMED = 12, 12
@@ -62,7 +62,8 @@ def _is_text(column: pd.Series) -> bool:
 def sweep(results: xr.Dataset, quantity: str | None = None, *, along: str | None = None, times: Any = -1) -> Figure:
     """Draw a quantity of all cases against a swept key, or over time, as small multiples over the other keys.
 
-    The key with the next most numbers colours the lines, all others make panels, up to twelve. Realisations are drawn
+    The key with the next most numbers gives the lines colours, dashes and markers, all others make panels, up to
+    twelve. Of equal lines the earlier ones are wider. Realisations are drawn
     as their mean, with the 95 % prediction interval of a single one; for a scan, also the measured scan is drawn.
 
     Parameters
@@ -74,8 +75,9 @@ def sweep(results: xr.Dataset, quantity: str | None = None, *, along: str | None
         coefficient.
     along : str, optional
         Dotted key on the horizontal axis, such as ``"program.0.load"``; or ``"time"``, ``"speed"``,
-        ``"reduced_speed"`` for curves of all cases, whose lines join the kept rows. Default: the key with most numbers,
-        or the speed; if only realisations vary, the time.
+        ``"reduced_speed"`` for curves of all cases. Lines over the time pass through every step, if known, and markers
+        are the kept times; other lines join the rows. Default: the key with most numbers, or the speed; if only
+        realisations vary, the time.
     times : list of float or str, str or int, default -1
         Times, as a list or one text with a unit; the nearest kept times are drawn. Negative whole numbers, also a
         single one, count from the end. [s]
@@ -105,9 +107,28 @@ def sweep(results: xr.Dataset, quantity: str | None = None, *, along: str | None
         others = [name for name in cases if name != across]
         table, columns = _at_times(results[quantity], times), [across, *others[:1], "", *others[1:]]
     else:
-        table, columns = results[[quantity, along]].load().to_dataframe().reset_index(), [along, *cases]
+        table, columns = _curves(results, quantity, along), [along, *cases]
     table = table.join(cases, on="case") if len(cases) else table
     return _draw(table, results[quantity], columns, results[along] if along in curves else None)
+
+
+def _curves(results: xr.Dataset, quantity: str, along: str) -> pd.DataFrame:
+    """Return a table of a quantity of all cases along an axis: at every step over time if known, else at the rows.
+
+    The column ``is_kept`` marks the rows of the results.
+    """
+    rows = results[[quantity, along]].load().to_dataframe().reset_index()
+    if along != "time" or quantity not in STEPPED or REALISATION in results.dims or "case" not in results.dims:
+        return rows.assign(is_kept=True)
+    parts = []
+    for case, number in enumerate(results["case"].values.tolist() if "case" in results.coords else []):
+        steps = steps_of(results.isel(case=case))
+        if steps is None or quantity not in steps:
+            return rows.assign(is_kept=True)
+        part = pd.DataFrame({"case": number, along: steps[along].values, quantity: steps[quantity].values})
+        kept = rows.loc[rows["case"] == number, along].dropna()
+        parts.append(part.assign(is_kept=part[along].isin(kept) & ~part[along].duplicated(keep="last")))
+    return pd.concat(parts, ignore_index=True) if parts else rows.assign(is_kept=True)
 
 
 def _at_times(values: xr.DataArray, times: Any = -1) -> pd.DataFrame:
@@ -124,16 +145,16 @@ def _at_times(values: xr.DataArray, times: Any = -1) -> pd.DataFrame:
             text = "at the end" if place == -1 else f"near {text}"
         parts.append(part.assign(**{"": text}))
     table = pd.concat(parts)
-    return table.assign(**{"": pd.Categorical(table[""], table[""].unique())})
+    return table.assign(**{"": pd.Categorical(table[""], table[""].unique())}, is_kept=True)
 
 
 def _draw(table: pd.DataFrame, quantity: xr.DataArray, columns: list[str], over: xr.DataArray | None = None) -> Figure:
     """Draw a table of cases: the first column, or `over`, across; the next one as colours; the others as panels."""
     name, (label, si) = str(quantity.name), style.described(quantity)
-    table = table[style.drawable(table[name]).notna()]
+    table = table[np.isfinite(table[name])]
     if table.empty:
         raise InputError(f"{name} has no value to draw")
-    unit = style.middle_unit(table[name], si)
+    unit = style.middle_unit(table[name][table[name] > 0] if name == "leak_rate" else table[name], si)
     table = table.assign(shown=unit(table[name]))
     across, families, rest = columns[0], columns[1:2], columns[2:]  # families tell the lines of a panel apart
     while len(panels := _grouped(table, rest)) > _MOST_PANELS:
@@ -148,14 +169,15 @@ def _draw(table: pd.DataFrame, quantity: xr.DataArray, columns: list[str], over:
     lines = max(len(title.splitlines()) for title in titles)
     figure, axes = style.new_panels(len(panels), count if count <= 4 else 3, size, shared="xy", lines=lines, **room)
     table = _placed(axes, table, across, over)
-    looks = _looks(table[families[0]]) if families else {None: {"color": style.BLUE}}
+    looks = _looks(table[families[0]]) if families else {None: {"color": style.BLUE, "marker": "o"}}
     for ax, (_, panel), title in zip(axes, _grouped(table, rest), titles, strict=True):
         for (level, *_), line in _grouped(panel, families):
             _draw_line(ax, line.sort_values("across"), looks[level], joined=not texts)
-        style.value_axis(ax, table["shown"], unit)
+        style.value_axis(ax, table["shown"], unit, may_vanish=name == "leak_rate")
         ax.set_title(title)
         ax.tick_params(axis="x", labelrotation=90 if is_turned else 0)
     style.label_panels(axes, y=unit.label(label))
+    style.letter(axes)
     named = style.named_in(*axes)
     in_order = {look["label"]: named.pop(look["label"]) for look in looks.values() if look.get("label") in named}
     style.legend_above(figure, in_order | named, families[0] if families else "")
@@ -182,12 +204,16 @@ def _text(level: Any) -> str:
 
 
 def _looks(column: pd.Series) -> dict[Any, dict[str, Any]]:
-    """Return level of a column -> colour and label of its lines; of many levels only some have a label."""
+    """Return level of a column -> colour, marker, dash and label of its lines; of many only some have a label."""
     levels = column.cat.categories
-    shades = matplotlib.colormaps["viridis"](np.linspace(0, 0.88, len(levels)))  # without the light end
+    shades = matplotlib.colormaps["viridis"](np.linspace(0, 0.8, len(levels)))  # without the light end
     named = {*levels[:: -(-len(levels) // _MOST_NAMED)]}
     texts = [_text(level) if level in named else None for level in levels]
-    return {level: {"color": one, "label": text} for level, one, text in zip(levels, shades, texts, strict=True)}
+    others = style.distinct(len(levels))
+    return {
+        level: {"color": shade, "label": text} | other
+        for level, shade, text, other in zip(levels, shades, texts, others, strict=True)
+    }
 
 
 def _placed(axes: Sequence[Axes], table: pd.DataFrame, column: str, over: xr.DataArray | None) -> pd.DataFrame:
@@ -207,9 +233,15 @@ def _placed(axes: Sequence[Axes], table: pd.DataFrame, column: str, over: xr.Dat
 
 def _draw_line(ax: Axes, line: pd.DataFrame, look: dict[str, Any], *, joined: bool) -> None:
     """Draw one line of a panel; of realisations the mean, the prediction interval, and the measured scan."""
-    look = {"marker": "o" if len(line) <= 100 else "", "ls": "-" if joined else ""} | look
+    look = dict(look)
+    if line["is_kept"].sum() > 100:
+        look["marker"] = ""
+    elif not joined:
+        look["marker"] = look.get("marker") or "o"
+    if not joined:
+        look["ls"] = ""
     if REALISATION not in line:
-        ax.plot(line["across"], line["shown"], **look)
+        ax.plot(line["across"], line["shown"], markevery=np.flatnonzero(line["is_kept"]).tolist(), **look)
         return
     # realisations with times of their own are interpolated to common times
     wide = line.pivot_table("shown", "across", REALISATION).interpolate("index", limit_area="inside").dropna()

@@ -254,11 +254,13 @@ def _computed(
     if client is not None:
         require_same_version(client)
         log.info("dashboard: %s", client.dashboard_link)
+        display.say(f"Dashboard: {client.dashboard_link}")
         yield from distribute(todo, folder, display, client, threads)
         return
     while todo:
         large = {}
         with local_client(processes) as own:
+            display.say(f"Dashboard: {own.dashboard_link}")
             for outcome in distribute(todo, folder, display, own, threads or threads_each(processes), own=True):
                 if outcome.error == "TooLargeError" and workers is None and processes > 1:
                     large[outcome.key] = todo[outcome.key]

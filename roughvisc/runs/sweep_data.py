@@ -314,13 +314,22 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.
         CASE_KEY: (("case",), np.array(keys), VARIABLES[CASE_KEY].attributes),
     }
     found = _by_realisation(_stacked(folder, entries).assign_coords(labels), parameters)
-    found.encoding[CARRIED] = partial(_steps_in, folder)
+    found.encoding[CARRIED] = _Steps(folder)
     return found
 
 
-def _steps_in(folder: Path, key: str) -> xr.Dataset | None:
-    """Return the history of the steps of a case in a folder, from its file."""
-    return steps_of(open_result(case_path(folder, key, "result")))
+@dataclass
+class _Steps:
+    """Histories of the steps of the cases in a folder, each read from its file at its first use."""
+
+    folder: Path
+    read: dict[str, xr.Dataset | None] = field(default_factory=dict, repr=False)
+
+    def __call__(self, key: str) -> xr.Dataset | None:
+        """Return the history of the steps of a case."""
+        if key not in self.read:
+            self.read[key] = steps_of(open_result(case_path(self.folder, key, "result")))
+        return self.read[key]
 
 
 def _stacked(folder: Path, entries: Sequence[Entry]) -> xr.Dataset:

@@ -94,6 +94,14 @@ def test_history__data_and_units():
     np.testing.assert_allclose(area.lines[0].get_ydata(), 1e6 * ds["contact_area"])
 
 
+def test_history__draws_a_leak_rate_of_zero():
+    ds = made.hertz_creep((21, 16), 4).assign(leak_rate=("time", [1e-9, 1e-12, 1e-15, 0.0]))
+    (ax,) = plot.history(ds, "leak_rate").axes
+    assert ax.get_yscale() == "symlog"
+    assert ax.lines[0].get_ydata()[-1] == 0
+    assert ax.get_ylim()[0] <= 0
+
+
 def test_area_against_load__one_line_per_case_and_the_low_load_line():
     ds = made.rough_creep(absent=False)
     ds["force"] = ("time", np.geomspace(0.01, 10, 12))
@@ -137,6 +145,27 @@ def test_maps__data_scale_and_absent_cells():
         assert np.array_equal(np.ma.getmaskarray(image.get_array()), ds["height"].isnull().values.T)
         np.testing.assert_allclose(image.get_extent(), [0, 1.2, 0, 0.9])
     assert len({image.get_clim() for image in shown[:3]}) == 1
+    panels = [image.axes for image in shown]
+    assert [ax.get_title(loc="right") for ax in panels] == list("abcdef")
+    assert all(ax.collections for ax in panels), "a line around the contact on both fields"
+
+
+def test_maps__choose_times_by_change_and_leave_out_those_without_contact():
+    ds = made.hertz_creep(times=[0.0, 0.01, 0.02, 0.5, 1.0, 2.0, 4.0])
+    ds["pressure"][0] = ds["contact_area"][0] = 0.0
+    ds["contact_area"][1:] = np.array([1.0, 1.01, 2.0, 2.99, 3.0, 4.0])
+    titles = [ax.get_title(loc="left") for ax in plot.maps(ds, fields="pressure").axes[:-1]]
+    assert titles == ["t = 10 ms", "t = 500 ms", "t = 2 s", "t = 4 s"]
+    assert len(images(plot.maps(made.open_contact(), fields="gap"))) == 2
+
+
+@pytest.mark.parametrize(("axis", "count"), [("time", 1), ("speed", 2)])
+def test_maps__over_speed_have_a_scale_each(axis, count):
+    ds = made.rough_creep((24, 20), 2, absent=False).rename(time=axis)[["pressure", "height", "force"]]
+    ds[axis].attrs.clear()
+    ds["pressure"][1] = 10 * ds["pressure"][0]
+    ds["friction_coefficient"] = axis, [0.1, 0.2]
+    assert len({image.get_clim() for image in images(plot.maps(ds, times=[0, -1]))}) == count
 
 
 def test_maps__of_the_times_and_fields_requested():
@@ -199,6 +228,9 @@ def test_section__surfaces_touch_where_pressure_is(axis):
         assert np.array_equal(np.isfinite(contact.get_ydata()), last["pressure"] > 0)
         np.testing.assert_allclose(top.patches[0].get_data().values, 1e-3 * last["pressure"])
         assert (top.get_ylabel(), bottom.get_ylabel()) == ("Pressure [kPa]", "Height [µm]")
+        (x0, y0), (x1, y1) = bottom.transData.transform([(0, 0), (1, 1)])  # of a millimetre, of a micrometre
+        enlarged = (y1 - y0) / (x1 - x0) / 1e-3
+        assert bottom.get_title(loc="left") == f"heights enlarged {enlarged:.3g} times"
 
 
 # ----------------------------------------------------------------------------------------------------- surfaces
@@ -207,7 +239,8 @@ def test_section__surfaces_touch_where_pressure_is(axis):
 def test_surface__states_the_sq_and_the_spectrum_of_the_levelled_heights():
     h = rv.self_affine((3e-4, 2e-4), (120, 90), hurst=0.8, rms_height=1e-6, rolloff=5e-5, seed=3)
     tilted = h + 0.1 * h.x - 0.05 * h.y
-    heights, spectrum = plot.surface(tilted).axes[2:4]
+    heights, spectrum = plot.surface(tilted, cutoff="20 um").axes[2:4]
+    assert spectrum.lines[1].get_xdata()[0] == pytest.approx(2 * np.pi / 20)
     sq = float(rv.parameters(off_plane(tilted))["Sq"])
     assert heights.get_title(loc="left") == f"Sq = {1e6 * sq:.3g} µm"
     assert sum(bar.get_height() * bar.get_width() for bar in heights.patches) == pytest.approx(1.0)

@@ -7,12 +7,14 @@ import pytest
 import sample_results as made
 import scipy.stats
 import xarray as xr
+from click.testing import CliRunner
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgba
 from support import BALL, refused
 
 import roughvisc as rv
 from roughvisc import plot
+from roughvisc.cli import main
 from roughvisc.errors import InputError
 from roughvisc.labels import label
 from roughvisc.plot.save import results_of_sweep, save_figures_of_files, save_sweep_figures
@@ -76,6 +78,8 @@ def test_sweep__of_two_keys_has_a_panel_for_each_time():
     assert [ax.get_title(loc="left") for ax in figure.axes] == ["t = 1 s", "t = 10 s"]
     assert legend(figure) == ["1", "10", "100", "1000"]
     assert figure.legends[0].get_title().get_text() == "Kelvin viscosity [kPa s]"
+    looks = [(line.get_marker(), line.get_lw()) for line in figure.axes[0].lines]
+    assert len(set(looks)) == 4, "lines are told apart without their colours, and equal ones by their widths"
     for ax, share in zip(figure.axes, (0.5, 1.0), strict=True):
         for line, power in zip(ax.lines, (3, 4, 5, 6), strict=True):
             np.testing.assert_allclose(line.get_ydata(), share * power * LOADS**0.9)
@@ -189,7 +193,7 @@ def test_figures__a_realisation_without_a_result_does_not_count():
 
 STUDY = (
     BALL.replace("over = 0", 'over = "50 ms"').replace(
-        'fields = ["pressure", "displacement"]\ntimes = [0, "0.1 s", "200 ms"]', 'fields = []\ntimes = "all"'
+        'fields = ["pressure", "displacement"]\ntimes = [0, "0.1 s", "200 ms"]', "fields = []\ntimes = 4"
     )
     + '[sweep]\n"program.0.load" = ["1 mN", "5 mN", "10 mN"]\n"program.1.hold" = ["0.1 s", "0.2 s"]\n'
 )
@@ -208,14 +212,20 @@ def test_sweep__of_cases_with_times_of_their_own(tmp_path, coarse_pictures):
     at_end = [float(one[int(rows) - 1]) for one, rows in zip(held.approach, held.rows, strict=True)]
     scale = {"µm": 1e6, "nm": 1e9}[ax.get_ylabel()[-3:-1]]
     np.testing.assert_allclose(ax.lines[0].get_ydata(), scale * np.array(at_end))
-    assert [len(ax.lines) for ax in plot.sweep(results, "approach", along="time").axes] == [3, 3], (
-        "a panel for each hold"
-    )
+    panels = plot.sweep(results, "approach", along="time").axes
+    assert [len(ax.lines) for ax in panels] == [3, 3], "a panel for each hold"
+    steps = held.isel(case=0).roughvisc.steps
+    line = panels[0].lines[0]
+    np.testing.assert_allclose(line.get_ydata() / line.get_ydata()[-1], steps.approach / steps.approach[-1])
+    assert len(line.get_markevery()) == int(held.rows[0]) < steps.sizes["step"], "markers are the kept times"
     names = [name for name, _, _ in sweep_figures(results)]
     assert names == ["contact_area-time", "contact_area", "approach"], "the force is known"
     written = save_sweep_figures(results, tmp_path / "figures")
     assert [path.name for path in written] == [f"sweep-{name}.png" for name in names]
     assert sorted((tmp_path / "figures").iterdir()) == sorted(written)
+    command = ["plot", str(tmp_path / "results"), "--out", str(tmp_path / "vector"), "--format", "svg"]
+    assert CliRunner().invoke(main, command).exit_code == 0
+    assert {path.name for path in (tmp_path / "vector").iterdir()} == {f"sweep-{name}.svg" for name in names}
     assert results_of_sweep(tmp_path) is None
     paths = sorted((tmp_path / "results").glob("*.nc"))
     every = [path.stem.rpartition("-")[2] for path in save_figures_of_files(paths, tmp_path / "cases")]

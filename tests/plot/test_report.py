@@ -12,7 +12,7 @@ from support import BALL
 
 from roughvisc.cli import main
 from roughvisc.errors import InputError
-from roughvisc.reports.report import report
+from roughvisc.plot.report import report
 from roughvisc.runs.csv_files import to_table
 from roughvisc.runs.folder import write_json
 from roughvisc.runs.run import run_case
@@ -57,6 +57,17 @@ def test_page__numbers_the_cases_as_their_table(folder, page):
     ]
     assert "3 cases, 1 failed" in page
     assert "<td>&lt;i&gt;Too far&lt;/i&gt; Load 9 N</td><td>contact reached the &lt;u&gt;border&lt;/u&gt;</td>" in page
+
+
+@pytest.mark.thorough
+def test_page__has_one_audit_for_cases_with_the_same_verdicts_and_links_the_page_to_explore(folder, tmp_path):
+    (tmp_path / "page.html").write_text("to explore")
+    text = report(folder, tmp_path / "report.html").read_text()
+    audit = text[text.index('id="audit"') : text.index('id="run"')]
+    assert re.findall("<h3>(.*?)</h3>", audit) == ["Cases 0, 1, 2"]
+    assert audit.count("<table") == 1
+    assert '<a href="page.html">' in text
+    assert "prefers-color-scheme: dark" in text
 
 
 @pytest.mark.thorough

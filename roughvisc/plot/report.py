@@ -5,11 +5,13 @@ from __future__ import annotations
 import base64
 import io
 import json
+from collections.abc import Sequence
 from contextlib import nullcontext, suppress
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import matplotlib
 import numpy as np
@@ -21,7 +23,7 @@ from roughvisc.errors import InputError
 from roughvisc.judge.audit import audit
 from roughvisc.labels import cost_of, grid_error_of, warnings_of
 from roughvisc.observables.history import expect_result
-from roughvisc.paths import path_of
+from roughvisc.paths import path_of, shell_word
 from roughvisc.plot import style
 from roughvisc.plot.fields import surface
 from roughvisc.plot.save import DEFAULT, FIGURES, figures_of, in_parallel, results_of_sweep, varies_surface
@@ -35,8 +37,8 @@ from roughvisc.topography.parameters import parameters
 from roughvisc.units import unit_for
 from roughvisc.variables import AXES, VARIABLES, axis_of, in_table
 
-#: Largest number of cases with figures, audit and study, which are evenly spread.
-_SHOWN = 6
+#: Largest numbers of cases with audit and study, and with figures; both are evenly spread.
+_SHOWN, _DRAWN = 6, 2
 #: Resolution of pictures, and the width from which a narrow screen scrolls them. [1/inch], [inch]
 _DPI, _WIDE = 110, 5.5
 #: Surface parameters shown.
@@ -58,16 +60,23 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
     Returns
     -------
     pathlib.Path
-        The self-contained file. Its table has all cases. Figures, audit and study show up to 6 cases, evenly spread.
+        The self-contained file. Its table has all cases. Audit and study show up to 6 cases, evenly spread, and
+        figures the first and the last one. The page of :func:`roughvisc.plot.page` in the same folder is linked.
 
     Raises
     ------
     InputError
         If there are zero results, or a Dataset comes without `out`.
     """
-    page: dict[str, Any] = {"failures": {}, "figures": [], "words": case_words, "text": _text}
+    page: dict[str, Any] = {
+        "rows": "times or speeds",
+        "failures": {},
+        "figures": [],
+        "words": case_words,
+        "text": _text,
+    }
     out = out if out is None else path_of(out, "out")
-    sources, numbers = [results], {}
+    sources, numbers, histories = [results], {}, {}
     if isinstance(results, xr.Dataset):
         if out is None:
             raise InputError("out is None: expected the name of the page, if a Dataset is given")
@@ -81,10 +90,16 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
         sources.sort(key=lambda path: numbers.get(path.stem, len(numbers)))
         if len(sources) > 1 and (swept := results_of_sweep(folder)) is not None:
             page["figures"] = [_picture(caption, figure) for _, caption, figure in sweep_figures(swept)]
+            histories = _histories(swept)
     else:
         out, sources = out or folder.with_name(f"{folder.stem}-report.html"), [folder]
-    shown = set(np.linspace(0, len(sources) - 1, min(len(sources), _SHOWN)).astype(int).tolist())
-    page["cases"] = in_parallel(_case, [(one, i, i in shown) for i, one in enumerate(sources)], processes, "report")
+    shown = _spread(range(len(sources)), _SHOWN)
+    drawn_cases = _spread(shown, _DRAWN)
+    jobs = [
+        (one if i in shown else histories.get(one.stem, one), i, i in shown, i in drawn_cases)
+        for i, one in enumerate(sources)
+    ]
+    page["cases"] = in_parallel(_case, jobs, processes, "report")
     drawn = set()
     for number, case in enumerate(page["cases"]):
         case["number"] = numbers.get(case["key"], "") if numbers else number
@@ -92,10 +107,45 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
             picture = case["surface"]["picture"]["src"]
             case["surface"] = None if picture in drawn else case["surface"]
             drawn.add(picture)
+    page["audits"] = _audits(page["cases"])
+    is_file = isinstance(results, str | Path) and not Path(results).is_dir()
+    explorer = Path(out).with_name(f"{Path(results).stem}-page.html" if is_file else "page.html")
+    page["explorer"] = quote(explorer.name) if explorer.is_file() else ""
+    page["explored"] = shell_word(Path(results)) if isinstance(results, str | Path) else ""
     page["written"] = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     page["version"] = metadata.version("roughvisc")
-    templates = Environment(loader=PackageLoader("roughvisc.reports", "."), autoescape=True, trim_blocks=True)
+    templates = Environment(loader=PackageLoader("roughvisc.plot", "."), autoescape=True, trim_blocks=True)
     return write_text(Path(out), templates.get_template("report.html.jinja").render(page))
+
+
+def _spread(numbers: Sequence[int], most: int) -> list[int]:
+    """Return up to some evenly spread numbers, with the first and the last one."""
+    places = np.linspace(0, len(numbers) - 1, min(len(numbers), most)).round().astype(int)
+    return [numbers[place] for place in places]
+
+
+def _histories(results: xr.Dataset) -> dict[str, xr.Dataset]:
+    """Return key -> histories of each case of a sweep, which need not be read from its file again."""
+    if results["case_key"].dims != ("case",) or not {"x", "y"} <= results.variables.keys():
+        return {}
+    return {str(key): results.isel(case=i) for i, key in enumerate(results["case_key"].values)}
+
+
+def _audits(cases: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return one audit for all cases with the same verdicts, with the range of each number and its worst case."""
+    groups: dict[tuple[Any, ...], list[dict[str, Any]]] = {}
+    for case in cases:
+        if "audit" in case:
+            groups.setdefault(tuple((one.name, one.verdict) for one in case["audit"]), []).append(case)
+    audits = []
+    for alike in groups.values():
+        rows = []
+        for findings in zip(*(case["audit"] for case in alike), strict=True):
+            ordered = sorted(findings, key=lambda one: one.number)
+            texts = list(dict.fromkeys((ordered[0].shown, ordered[-1].shown)))
+            rows.append({"worst": ordered[-1], "shown": " to ".join(texts)})
+        audits.append({"cases": alike, "rows": rows})
+    return audits
 
 
 @matplotlib.rc_context(style.STYLE)
@@ -104,27 +154,30 @@ def _picture(caption: str, figure: Figure) -> dict[str, Any]:
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=_DPI)
     src = f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
-    return {"caption": caption, "src": src, "wide": figure.get_figwidth() > _WIDE}
+    width = figure.get_figwidth()
+    return {"caption": caption, "src": src, "wide": width > _WIDE, "width": round(96 * width)}
 
 
-def _case(job: tuple[Path | xr.Dataset, int, bool]) -> dict[str, Any]:
-    """Return one case of the page: its row in the table and, if shown, figures, assumptions, surface and study."""
-    source, number, is_shown = job
+def _case(job: tuple[Path | xr.Dataset, int, bool, bool]) -> dict[str, Any]:
+    """Return one case of the page: its row in the table and, if shown, assumptions, surface and study, and figures."""
+    source, number, is_shown, is_drawn = job
     with open_result(source) if isinstance(source, Path) else nullcontext(source) as dataset:
         dataset = expect_result(dataset, "x", "y")
         case = json.loads(dataset.attrs.get("case", "{}"))
         title = str(case.get("title") or dataset.attrs.get("title") or f"case {number}")
         found = {"title": title, "name": case_words(case) or title, "key": str(dataset.attrs.get("case_key", ""))}
         found["cells"] = _cells(dataset)
-        return found | (_details(dataset, case, number) if is_shown else {})
+        return found | (_details(dataset, case, number, is_drawn) if is_shown else {})
 
 
-def _details(dataset: xr.Dataset, case: dict[str, Any], number: int) -> dict[str, Any]:
+def _details(dataset: xr.Dataset, case: dict[str, Any], number: int, is_drawn: bool) -> dict[str, Any]:
     """Return figures, assumptions and study of one case, and its surface if it is the first case or differs."""
     height = dataset.get("height", xr.DataArray())
     found: dict[str, Any] = {"attributes": {**height.attrs, **dataset.attrs}, "text": study_text(case) if case else ""}
     found["warnings"] = warnings_of(dataset.attrs)
-    found["figures"] = [_picture(caption, figure) for _, caption, figure in figures_of(dataset, DEFAULT)]
+    found["figures"] = [
+        _picture(caption, figure) for _, caption, figure in figures_of(dataset, DEFAULT if is_drawn else ())
+    ]
     if height.ndim and (number == 0 or varies_surface(case)):
         picture = _picture(FIGURES["surface"][2], surface(height))
         found["surface"] = {"picture": picture, "parameters": parameters(off_plane(height.load()))[[*_PARAMETERS]]}

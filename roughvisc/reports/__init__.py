@@ -1,1 +1,0 @@
-"""Report: one HTML page about results."""
