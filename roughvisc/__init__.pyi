@@ -42,6 +42,8 @@ from roughvisc.study.execution.sweep import sweep as sweep
 from roughvisc.study.machine_history import read_program as read_program
 from roughvisc.study.neighbours import budget as budget
 from roughvisc.study.plan import plan as plan
+from roughvisc.study.records import fit_material as fit_material
+from roughvisc.study.records import read_record as read_record
 from roughvisc.study.storage.netcdf import open_result as open_result
 from roughvisc.study.storage.sweep_data import open_results as open_results
 from roughvisc.study.storage.sweep_data import to_csv as to_csv

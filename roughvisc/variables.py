@@ -169,6 +169,10 @@ VARIABLES: dict[str, Variable] = {
     "thermal_conductance_error": Variable(_SERIES, "W/K", "stated error of the thermal conductance", _BOTH),
     "electrical_conductance": Variable(_SERIES, "S", "electrical conductance", _SPOTS),
     "electrical_conductance_error": Variable(_SERIES, "S", "stated error of the electrical conductance", _BOTH),
+    # records of indentation
+    "relaxation_modulus": Variable(_SERIES, "Pa", "relaxation modulus", "in shear"),
+    "relaxation_modulus_low": Variable(_SERIES, "Pa", "relaxation modulus, low", "lower end of its interval of 90 %"),
+    "relaxation_modulus_high": Variable(_SERIES, "Pa", "relaxation modulus, high", "upper end of its interval of 90 %"),
     # theories
     "persson_contact_area": Variable(_SERIES, "m^2", "contact area, Persson", _ASPERITIES),
     "asperity_contact_area": Variable(_SERIES, "m^2", "contact area, Bush et al.", f"at low loads, {_ASPERITIES}"),
