@@ -169,6 +169,14 @@ VARIABLES: dict[str, Variable] = {
     "thermal_conductance_error": Variable(_SERIES, "W/K", "stated error of the thermal conductance", _BOTH),
     "electrical_conductance": Variable(_SERIES, "S", "electrical conductance", _SPOTS),
     "electrical_conductance_error": Variable(_SERIES, "S", "stated error of the electrical conductance", _BOTH),
+    # observables: closure of a joint
+    "closure": Variable(_SERIES, "m", "closure", "fall of the mean gap since first touch"),
+    "normal_stiffness": Variable(
+        _SERIES,
+        "Pa/m",
+        "normal stiffness",
+        "slope of nominal pressure over closure",
+    ),
     # records of indentation
     "relaxation_modulus": Variable(_SERIES, "Pa", "relaxation modulus", "in shear"),
     "relaxation_modulus_low": Variable(_SERIES, "Pa", "relaxation modulus, low", "lower end of its interval of 90 %"),
