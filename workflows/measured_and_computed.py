@@ -92,7 +92,7 @@ def cell(figure=None):
         fig, axes = plt.subplots(figsize=(4.6, 2.8), layout="constrained")
         axes.plot(record.time - hold[0], record.force * 1e9, color="0.5", label="measured")
         for (name, curve), marker in zip(curves.items(), "o^s", strict=True):
-            axes.plot(*curve, marker, label=f"computed, {name}")
+            axes.plot(*curve, marker, fillstyle="none", label=f"computed, {name}")
         axes.axvspan(10, 30, color="0.93", zorder=0)
         axes.text(20, 300, "predicted", ha="center")
         axes.set(xlabel="Time since the start of the hold [s]", ylabel="Force [nN]", xlim=(-1.5, 31), ylim=(-20, 340))

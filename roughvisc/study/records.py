@@ -125,7 +125,8 @@ def read_record(
             key=f"{path}, line {lines[row]}: time", found=columns["time"][row], expected="increasing times"
         )
     if columns["force"].max() <= 0:
-        raise InputError(key="force", found=columns["force"].max(), expected="a positive force, compression positive")
+        highest = float(columns["force"].max())
+        raise InputError(key="force", found=highest, expected="a positive force, compression positive")
     if "height" in columns:
         if spring is None:
             raise InputError(key="spring", found=spring, expected="the stiffness of the cantilever [N/m], with height")
@@ -286,10 +287,10 @@ def fit_material(
     is_creep = kind == "creep" or (kind == "auto" and is_creep)
     searched = contact_point is None
     contact = _found_contact(rows) if contact_point is None else float(contact_point)
-    known = bands(rows, contact, drift, searched=searched)
     in_contact = np.count_nonzero(rows.depth > contact)
     if in_contact < _LEAST_ROWS:
         raise InputError(key="record", found=f"{in_contact} rows in contact", expected=f"at least {_LEAST_ROWS}")
+    known = bands(rows, contact, drift, searched=searched)
     is_known = known.high - known.low <= 2 * _WIDEST * known.modulus
     if not is_known.any():
         expected = "a record that determines the modulus to half of itself: less noise, or a longer hold"
@@ -370,6 +371,6 @@ def _found_contact(rows: Indentation) -> float:
     low, high = float(rows.depth.min()), float(rows.depth[above])
     contact = contact_point(rows, low, high) if high > low else low
     if contact <= low + 1e-3 * (high - low):
-        expected = "a record that begins before the contact, or contact_point"
+        expected = "a record that begins before the contact, with an offset of the force subtracted, or contact_point"
         raise InputError(key="contact_point", found="no rows before the contact", expected=expected)
     return contact
