@@ -47,10 +47,15 @@ def test_material__is_that_of_the_record():
 
 
 @pytest.mark.parametrize(
-    ("trials", "least", "most"), [(8, 0.75, 1.0), pytest.param(200, 0.85, 0.95, marks=pytest.mark.long)]
+    ("trials", "drift", "least", "most"),
+    [
+        (8, 0.0, 0.8, 1.0),
+        pytest.param(200, 0.0, 0.85, 0.95, marks=pytest.mark.long),
+        pytest.param(200, 0.3e-9, 0.85, 0.95, marks=pytest.mark.long),
+    ],
 )
-def test_intervals__cover_what_they_say(trials, least, most):
-    rng, drift = np.random.default_rng(7), 0.3e-9
+def test_intervals__cover_what_they_say(trials, drift, least, most):
+    rng = np.random.default_rng(7)
     is_inside, errors = [], []
     for _ in range(trials):
         fit = rv.fit_material(made_record(rng, drift=drift * rng.standard_normal()), TIP, drift=drift)
