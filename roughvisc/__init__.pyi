@@ -50,6 +50,8 @@ from roughvisc.study.case import read_study as read_study
 from roughvisc.study.case import vary as vary
 from roughvisc.study.machine_history import read_program as read_program
 from roughvisc.study.material_file import read_material as read_material
+from roughvisc.study.records import fit_material as fit_material
+from roughvisc.study.records import read_record as read_record
 from roughvisc.study.sweep_table import over_realisations as over_realisations
 from roughvisc.topography import example_scan as example_scan
 from roughvisc.topography.filters import fill as fill

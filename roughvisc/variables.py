@@ -365,6 +365,18 @@ VARIABLES: dict[str, Variable] = {
         is_panel=True,
     ),
     "electrical_conductance_error": Variable(_SERIES, "S", "stated error of the electrical conductance", _BOTH),
+    # observables: closure of a joint
+    "closure": Variable(_SERIES, "m", "closure", "fall of the mean gap since first touch"),
+    "normal_stiffness": Variable(
+        _SERIES,
+        "Pa/m",
+        "normal stiffness",
+        "slope of nominal pressure over closure",
+    ),
+    # records of indentation
+    "relaxation_modulus": Variable(_SERIES, "Pa", "relaxation modulus", "in shear"),
+    "relaxation_modulus_low": Variable(_SERIES, "Pa", "relaxation modulus, low", "lower end of its interval of 90 %"),
+    "relaxation_modulus_high": Variable(_SERIES, "Pa", "relaxation modulus, high", "upper end of its interval of 90 %"),
     # theories
     "persson_contact_area": Variable(_SERIES, "m^2", "contact area, Persson", _ASPERITIES, missing=_FALLEN),
     "asperity_contact_area": Variable(

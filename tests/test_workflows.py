@@ -156,3 +156,19 @@ def test_creeping_seal__leaks_less_and_less_until_it_closes(tmp_path, script):
     assert (np.diff(rate[: last + 1]) < 0).all(), "under a load that is held, the channels narrow"
     assert not rate[last + 1 :].any(), "what is closed stays closed"
     assert rate[0] / rate[last] > 1e5
+
+
+def test_rolling__is_that_of_contact(script):
+    for row in script("measured_and_computed").rolling().values():
+        assert row["peak [MPa]"] == pytest.approx(row["peak by CONTACT [MPa]"], rel=2e-3)
+        assert row["cells"] == pytest.approx(row["cells by CONTACT"])
+
+
+@pytest.mark.thorough
+def test_records__are_computed_as_the_page_says(tmp_path, script):
+    module = script("measured_and_computed")
+    found = module.brain(tmp_path / "brain.png")
+    assert found["searched"]["misfit"] < 3e-3
+    assert found["retraction"]["rms in hold [nN]"] < 0.05
+    for choice in list(module.cell(tmp_path / "cell.png").values())[1:]:
+        assert choice["rms in predicted hold [nN]"] < 10

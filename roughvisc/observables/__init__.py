@@ -12,12 +12,13 @@ from collections.abc import Callable
 
 import xarray as xr
 
-from roughvisc.observables.contact import clusters, conductance, contact, distribution, leakage
+from roughvisc.observables.contact import closure, clusters, conductance, contact, distribution, leakage
 from roughvisc.observables.history import cycle_work, history
 from roughvisc.observables.theory import area_by_theory, persson
 
 __all__ = [
     "area_by_theory",
+    "closure",
     "clusters",
     "conductance",
     "contact",

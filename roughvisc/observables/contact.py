@@ -222,6 +222,69 @@ def leakage(
     return described
 
 
+def closure(dataset: xr.Dataset, *, along: Literal["x", "y"] = "x") -> xr.Dataset:
+    r"""Compute stress, gap, hydraulic aperture and stiffness of a joint at every kept time, as a table.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result over time with ``gap``, present everywhere, such as of two faces (:func:`roughvisc.combine`).
+    along : {"x", "y"}
+        Direction of the flow.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over time ``nominal_pressure``, the normal stress [Pa]; ``mean_gap``, the mechanical aperture, ``closure`` and
+        ``hydraulic_aperture`` [m]; ``normal_stiffness`` [Pa/m], missing without pressure and at rows whose neighbours
+        have the same pressure or closure.
+
+    Raises
+    ------
+    InputError
+        See :func:`leakage`.
+
+    Notes
+    -----
+    The closure is the fall of the mean gap since first touch of the undeformed faces. The stiffness is
+    :math:`\bar p \, / (\mathrm d c / \mathrm d \ln \bar p)` by central differences of the closure :math:`c`, which
+    are exact for a logarithmic joint. It follows the rows of the result: keep rows of a slow load for the relaxed
+    stiffness.
+
+    Examples
+    --------
+    >>> rv.observables.closure(ds).to_dataframe().to_csv("joint.csv")  # doctest: +SKIP
+    """
+    need(dataset, "gap", "height", "mean_gap", "force")
+    aperture = leakage(dataset, along=along)["hydraulic_aperture"]
+    height, mean_gap = dataset["height"], dataset["mean_gap"]
+    highest = height.attrs.get("highest", height.max(("x", "y")))
+    closed = (highest - height.mean(("x", "y"))) - mean_gap
+    pressure = dataset["force"] / (math.prod(spacing(dataset, "closure")) * height.sizes["x"] * height.sizes["y"])
+
+    def stiffness(pressure: np.ndarray, closed: np.ndarray) -> np.ndarray:
+        found = np.full(pressure.shape, np.nan)
+        rows = np.flatnonzero(pressure > 0)
+        if rows.size > 1:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                slope = np.gradient(closed[rows], np.log(pressure[rows]))
+                found[rows] = pressure[rows] / slope
+        return np.where(np.isfinite(found), found, np.nan)
+
+    axis = [str(dim) for dim in mean_gap.dims][-1:]
+    stiff = xr.apply_ufunc(
+        stiffness, pressure, closed, input_core_dims=[axis, axis], output_core_dims=[axis], vectorize=True
+    )
+    variables = {
+        "nominal_pressure": pressure,
+        "mean_gap": mean_gap,
+        "closure": closed,
+        "normal_stiffness": stiff,
+        "hydraulic_aperture": aperture,
+    }
+    return label(xr.Dataset(variables).drop_attrs(deep=True))
+
+
 def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str]) -> xr.Dataset:
     r"""Compute the conductance of the contact spots at every kept time.
 

@@ -21,6 +21,7 @@ import xarray as xr
 from roughvisc.errors import InputError
 from roughvisc.paths import cause_of_system, opened, path_of, regular, unreadable
 from roughvisc.topography.formats import TOP_FIRST, open_file, orientation
+from roughvisc.topography.formats.mesh import heights_above
 from roughvisc.topography.formats.scan_file import Channel, ScanFile
 from roughvisc.topography.grid import MOST_CELLS, checked, in_metres, labelled, noted, pair, with_coordinates
 from roughvisc.topography.grid import spacing as cell_sides
@@ -81,12 +82,16 @@ def _labelled(file: ScanFile, channel: Channel, given: Mapping[str, Any]) -> xr.
     xy, z = _metres(channel, given)
     grid, no_data = given.get("grid"), given.get("no_data")
     spacing = pair("spacing", given["spacing"]) if "spacing" in given else None
-    if grid is not None and (channel.kind != "points" or spacing is not None):
+    if grid is None and channel.kind == "triangles":
+        raise InputError(key="grid", found=grid, expected="the side of the cells, for a mesh of triangles")
+    if grid is not None and (channel.kind == "height" or spacing is not None):
         raise InputError(key="grid", found=grid, expected="none for a map, or with a spacing")
     raw = channel.load()
     sides: Any = channel.spacing
     values = np.asarray(raw, dtype=float)
-    if channel.kind == "points":
+    if channel.kind == "triangles":
+        values, sides = meshed(values, grid / xy, file.complaints), (grid / xy, grid / xy)
+    elif channel.kind == "points":
         points = values[np.isfinite(values[:, :2]).all(axis=1)]
         points[:, 2] = _without_no_data(points[:, 2], no_data, file.complaints)
         values, sides = laid_out(points, None if grid is None else grid / xy, xy, file.complaints)
@@ -120,7 +125,7 @@ def _metres(channel: Channel, given: Mapping[str, Any]) -> tuple[float, float]:
     """Return the metres per unit of x and y, and per unit of the heights, from the file or else from the options."""
     lateral, vertical = _units(given.get("unit"))
     stated = channel.unit
-    is_sized = channel.kind == "points" or bool(channel.positions) or all(side > 0 for side in channel.spacing or [0.0])
+    is_sized = channel.kind != "height" or bool(channel.positions) or all(side > 0 for side in channel.spacing or [0.0])
     needs_unit = stated is None or (is_sized and channel.lateral_unit is None and "spacing" not in given)
     lacking = {}
     if needs_unit and lateral is None:
@@ -302,6 +307,29 @@ def laid_out(
         text = f"its {len(points)} points lie on no regular lattice: expected {proposed}, or similar"
         raise InputError(text, key="grid", expected="the side of the cells into which the points are sorted")
     return found
+
+
+def meshed(corners: np.ndarray, side: float, complaints: list[str]) -> np.ndarray:
+    """Return the heights of a mesh on square cells, see :func:`roughvisc.topography.formats.mesh.heights_above`.
+
+    Parameters
+    ----------
+    corners : ndarray, shape (n, 3, 3)
+        Corners of the triangles.
+    side : float
+        Side of the cells, in the unit of the corners.
+    complaints : list of str
+        Gains a remark if cells have no triangle.
+    """
+    if not len(corners) or not np.isfinite(corners).all():
+        raise InputError("its triangles are absent or not finite: expected a mesh of triangles")
+    size = np.ptp(corners[..., :2], axis=(0, 1))
+    if min(size) < 2 * side or np.prod(size / side) > MOST_CELLS:
+        raise InputError(key="grid", found=side, expected=f"a side that fits at least twice into {size}")
+    heights = heights_above(corners, side)
+    if empty := int(np.isnan(heights).sum()):
+        complaints.append(f"{empty} of {heights.size} cells of the grid have no triangle")
+    return heights
 
 
 def lattice(points: np.ndarray) -> tuple[np.ndarray, tuple[float, float]] | None:

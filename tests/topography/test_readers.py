@@ -175,7 +175,7 @@ def test_refusal__of_what_only_poses_as_a_scan_of_any_suffix(content, tmp_path):
         refusal(path)
 
 
-@pytest.mark.parametrize("suffix", ["stl", "PLY", "png", "jpg", "h5-jpk", "topostats", "xls", "xlsx"])
+@pytest.mark.parametrize("suffix", ["obj", "png", "JPG", "h5-jpk", "topostats", "xls", "xlsx"])
 def test_refusal__of_files_without_a_map_says_what_to_export(suffix, tmp_path):
     (tmp_path / f"a.{suffix}").write_bytes(b"solid own")
     with refused("format", f".{suffix}") as caught:

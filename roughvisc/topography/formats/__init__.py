@@ -15,7 +15,7 @@ from pathlib import Path
 from roughvisc.arguments import listed_names
 from roughvisc.errors import InputError
 from roughvisc.paths import cause_of_system
-from roughvisc.topography.formats import binary, text
+from roughvisc.topography.formats import binary, mesh, text
 from roughvisc.topography.formats.scan_file import Channel, ScanFile
 
 __all__ = ["READERS", "Channel", "ScanFile", "add_format", "open_file", "orientation", "supported_formats"]
@@ -29,17 +29,18 @@ READERS: dict[str, tuple[Sequence[str], Callable[[Path], ScanFile]]] = {
     "nc": (("nc", "nc4", "cdf", "hdf5"), binary.read_netcdf),
     "tmd": (("tmd",), binary.read_truemap),
     "sur": (("sur",), binary.read_digital_surf),
+    "stl": (("stl",), mesh.read_stl),
+    "ply": (("ply",), mesh.read_ply),
     "txt": (("txt", "csv", "asc", "xyz"), text.read_text_file),
     **dict.fromkeys(("csv", "xyz", "asc", "zygo", "wyko", "esri", "keyence"), ((), text.read_text_file)),
 }
 #: Formats to try, in this order, for suffixes that are also used for other content.
 _SHARED = {"dat": ("metropro", "txt"), "h5": ("nc", "h5")}
 #: Suffix -> kind of a file that no reader reads or that holds no heights, and what to export instead.
-_MESH = "a mesh of triangles: expected its vertices as text, x, y and z on each line (.xyz), with unit and grid"
 _PICTURE = "a picture without heights: expected the heights, such as .x3p, .sur or a text matrix, from the instrument"
 _SHEET = "a spreadsheet: expected its sheet of heights as .csv, with unit and spacing"
 _EXPORTS = {
-    **dict.fromkeys(("stl", "ply", "obj"), _MESH),
+    "obj": "a mesh of another format: expected .stl or .ply, with unit and grid",
     **dict.fromkeys(("png", "jpg", "jpeg", "bmp", "gif"), _PICTURE),
     **dict.fromkeys(("xls", "xlsx", "ods"), _SHEET),
     "h5-jpk": "a video of a JPK instrument: expected one height image, saved as .jpk or as text",
@@ -60,7 +61,7 @@ TOP_FIRST = {
 STATED = {
     "wyko": "not verified: each line is a column of the map from the bottom up, as Gwyddion reads it",
     "nc": "verified: the coordinates in the file",
-    "xyz": "verified: the coordinates in the file",
+    **dict.fromkeys(("xyz", "stl", "ply"), "verified: the coordinates in the file"),
 }
 TAKEN = "not verified: rows are taken to run along x and the first to be y = 0; it may be a mirror image"
 

@@ -19,7 +19,8 @@ class Channel:
         Name, as ``channel=`` of :func:`roughvisc.open_scan` takes it.
     load : callable
         Returns the heights over (x, y), peaks up, NaN where missing, in `unit`: an array, or a DataArray whose
-        attributes and coordinates are kept; for points an array of shape (n, 3).
+        attributes and coordinates are kept; for points an array of shape (n, 3), for
+        triangles one of shape (n, 3, 3): triangle, corner, coordinate.
     unit : str, optional
         Unit of the heights; None if the file states none.
     lateral_unit : str, optional
@@ -28,8 +29,9 @@ class Channel:
         Cell sides in `lateral_unit`; None if the file states none.
     positions : tuple of ndarray, optional
         Cell centres along x and y in `lateral_unit`; None if the file states none.
-    kind : {"height", "points", "profile", ...}
-        ``"height"`` for an areal grid, ``"points"`` for points x, y, z, otherwise a description of the content.
+    kind : {"height", "points", "triangles", "profile", ...}
+        ``"height"`` for an areal grid, ``"points"`` for points x, y, z, ``"triangles"`` for a mesh, otherwise a
+        description of the content.
     """
 
     name: str
@@ -43,7 +45,7 @@ class Channel:
     @property
     def is_height(self) -> bool:
         """Whether the channel holds heights over x and y."""
-        return self.kind in ("height", "points")
+        return self.kind in ("height", "points", "triangles")
 
 
 @dataclass(frozen=True)
