@@ -12,6 +12,7 @@ from roughvisc.errors import RoughviscError as RoughviscError
 from roughvisc.errors import TooLargeError as TooLargeError
 from roughvisc.mechanics import closed_forms as closed_forms
 from roughvisc.mechanics.body import Body as Body
+from roughvisc.mechanics.heating import Heating as Heating
 from roughvisc.mechanics.layer import layer as layer
 from roughvisc.mechanics.materials.creep import Prony as Prony
 from roughvisc.mechanics.materials.creep import arrhenius as arrhenius
@@ -30,6 +31,7 @@ from roughvisc.mechanics.materials.tables import dynamic_table as dynamic_table
 from roughvisc.mechanics.materials.tables import relaxation_table as relaxation_table
 from roughvisc.mechanics.program import Program as Program
 from roughvisc.mechanics.sheet import sheet as sheet
+from roughvisc.observables.friction_theory import friction_theory as friction_theory
 from roughvisc.reports.report import report as report
 from roughvisc.settings import Numerics as Numerics
 from roughvisc.study.audit import audit as audit
@@ -61,9 +63,12 @@ from roughvisc.topography.framing import mirror as mirror
 from roughvisc.topography.framing import rotate90 as rotate90
 from roughvisc.topography.inspection import inspect as inspect
 from roughvisc.topography.parameters import parameters as parameters
+from roughvisc.topography.radial_spectrum import join_psd as join_psd
+from roughvisc.topography.radial_spectrum import psd_table as psd_table
 from roughvisc.topography.readers import from_array as from_array
 from roughvisc.topography.recipes import cone as cone
 from roughvisc.topography.recipes import flat_punch as flat_punch
+from roughvisc.topography.recipes import from_spectrum as from_spectrum
 from roughvisc.topography.recipes import self_affine as self_affine
 from roughvisc.topography.recipes import sphere as sphere
 from roughvisc.topography.recipes import surrogates as surrogates
