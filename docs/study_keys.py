@@ -17,7 +17,7 @@ from roughvisc.mechanics.materials.creep import stiffened
 from roughvisc.mechanics.program import UNITS, Program
 from roughvisc.settings import Numerics, Settings
 from roughvisc.study.machine_history import read_history
-from roughvisc.study.study_file import COLUMNS, PROGRAMS, SEGMENTS, TABLE_OF, unit_of
+from roughvisc.study.study_file import COLUMNS, PROGRAMS, SEGMENTS, SPECTRUM, TABLE_OF, unit_of
 from roughvisc.topography.conditioning import FACE_STEPS, STEPS
 from roughvisc.topography.recipes import RECIPES, surrogate
 
@@ -80,6 +80,7 @@ _EXTRA = {
         "conductance": ("", "none", "conductance of the contact spots"),
     },
     **{f"material: {model}": {"file": _FILE} for model in COLUMNS},
+    "generate: spectrum": {"file": _FILE},
 }
 
 
@@ -222,12 +223,11 @@ def rows(name):
         unit = _UNITS.get(key) if name.startswith(("program.", "material: dynamic")) else None
         if name == "program.table: a file" and key in UNITS:
             unit = "-"  # the name of a column
-        unit = (
-            unit
-            or unit_of(f"{above}.{key}").removeprefix("1")
-            or units_of(function).get(argument, "").removeprefix("1")
+        stated = (unit, unit_of(f"{above}.{key}"), units_of(function).get(argument, ""))
+        unit = next((one for one in stated if one not in (None, "", "1")), "")
+        columns = (
+            SPECTRUM if above == "surface" else COLUMNS.get(name.removeprefix("material: "), {})
         )
-        columns = COLUMNS.get(name.removeprefix("material: "), {})
         default = "required, or `file`" if key in columns else _default(name, function, argument)
         found.append((key, unit, default, meaning(function, argument)))
     return found

@@ -73,6 +73,8 @@ COLUMNS: dict[str, dict[str, Wanted]] = {
         "shift_factors": Wanted("shift_factor", "1", optional=True),
     },
 }
+#: Columns of the CSV file of ``generate = "spectrum"``, by argument.
+SPECTRUM = {"wavevectors": Wanted("wavevector", "1/m"), "densities": Wanted("density", "m^4")}
 
 # ----------------------------------------------------------------------------------------------------------------
 # units
@@ -186,6 +188,7 @@ def with_files(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
         if name not in data:
             raise InputError(f"{name}: missing: expected a table [{name}]", key=name, expected=f"a table [{name}]")
     tables = in_si(data, "", data, folder)
+    tables["surface"] = with_spectrum("surface", tables["surface"])
     tables["material"] = with_columns("material", tables["material"])
     if isinstance(segments := tables.get("program"), list):
         for place, stated in enumerate(segments):
@@ -223,12 +226,29 @@ def with_columns(where: str, stated: Any) -> dict[str, Any]:
     columns = COLUMNS.get(str(table.get("model")), {})
     if not columns or "file" not in table:
         return table
-    file = table.pop("file")
-    for key in columns.keys() & table.keys():
-        raise InputError(key=f"{where}.file", found=file, expected=f"either a file or {key}")
     if "frequencies" in columns:
         unit = one_of(f"{where}.frequency_unit", table.get("frequency_unit"), FREQUENCY_UNITS)
         columns = columns | {"frequencies": columns["frequencies"]._replace(unit=unit)}
+    return _with_file(where, table, columns)
+
+
+def with_spectrum(where: str, stated: Any) -> Any:
+    """Return a table of a surface with the columns of the CSV file of its spectrum, without the name of the file."""
+    if not isinstance(stated, Mapping):
+        return stated
+    table = dict(stated)
+    if "second" in table:
+        table["second"] = with_spectrum(f"{where}.second", table["second"])
+    if table.get("generate") != "spectrum" or "file" not in table:
+        return table
+    return _with_file(where, table, SPECTRUM)
+
+
+def _with_file(where: str, table: dict[str, Any], columns: Mapping[str, Wanted]) -> dict[str, Any]:
+    """Return a table with the columns of its file in place of the name of the file."""
+    file = table.pop("file")
+    for key in columns.keys() & table.keys():
+        raise InputError(key=f"{where}.file", found=file, expected=f"either a file or {key}")
     try:
         found, _ = read_table(file, columns)
     except InputError as error:
