@@ -254,3 +254,15 @@ def test_heat_of_a_sliding_surface__shifts_its_material(rough):
     heat = {"heat_conductivity": 0.3, "volumetric_heat_capacity": 1.8e6}
     assert rv.audit(warm.drop_vars("temperature"), **heat)["heating"].number == pytest.approx(rise, rel=5e-3)
     assert rv.audit(warm)["heating"].verdict == "holds"
+
+
+def test_study__takes_a_spectrum_from_a_file(tmp_path):
+    """In the units of its heading, from the table of the surface."""
+    (tmp_path / "road.csv").write_text("wavevector [1/um], density [um^4]\n0.02, 3\n0.2, 0.001\n")
+    (tmp_path / "study.toml").write_text(
+        '[surface]\ngenerate = "spectrum"\nfile = "road.csv"\nconvention = "persson"\nsize = 2e-4\nshape = 16\n'
+        'seed = 1\n[material]\nmodel = "elastic"\nshear_modulus = 1e6\n[friction]\nload = 1e-3\nspeeds = 0.1\n'
+    )
+    table = {"wavevectors": [2e4, 2e5], "densities": [3e-24, 1e-27], "convention": "persson"}
+    same = rv.from_spectrum(2e-4, 16, **table, seed=1)
+    assert rv.read_study(tmp_path / "study.toml").height().values == pytest.approx(same.values, rel=1e-9)
