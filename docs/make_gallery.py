@@ -59,7 +59,14 @@ FIGURES = {
 }
 SCRIPTS = {
     name: f"figures/{name}.png"
-    for name in ("maxwell_step", "zener_step", "thin_sheet", "coating", "stability_map")
+    for name in (
+        "maxwell_step",
+        "zener_step",
+        "thin_sheet",
+        "coating",
+        "tyre_on_asphalt",
+        "stability_map",
+    )
 }
 
 

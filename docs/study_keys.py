@@ -18,7 +18,7 @@ from roughvisc.mechanics.program import UNITS, Program
 from roughvisc.settings import Numerics, Settings
 from roughvisc.study.machine_history import read_history
 from roughvisc.study.material_file import COLUMNS
-from roughvisc.study.study_file import PROGRAMS, SEGMENTS, TABLE_OF, unit_of
+from roughvisc.study.study_file import PROGRAMS, SEGMENTS, SPECTRUM, TABLE_OF, unit_of
 from roughvisc.topography.conditioning import FACE_STEPS, STEPS
 from roughvisc.topography.recipes import RECIPES, surrogate
 
@@ -89,6 +89,13 @@ _EXTRA = {
         "conductance": ("", "none", "conductance of the contact spots"),
     },
     **{f"material: {model}": _FILE for model in COLUMNS},
+    "generate: spectrum": {
+        "file": (
+            "",
+            "none",
+            "a CSV file with the columns `wavevector` and `density`, relative to the study",
+        )
+    },
 }
 
 
@@ -231,17 +238,14 @@ def rows(name):
         unit = _UNITS.get(key) if name.startswith(("program.", "material: dynamic")) else None
         if name == "program.table: a file" and key in UNITS:
             unit = "-"  # the name of a column
-        unit = (
-            unit
-            or unit_of(f"{above}.{key}").removeprefix("1")
-            or units_of(function).get(argument, "").removeprefix("1")
-        )
+        stated = (unit, unit_of(f"{above}.{key}"), units_of(function).get(argument, ""))
+        unit = next((one for one in stated if one not in (None, "", "1")), "")
         columns = COLUMNS.get(name.removeprefix("material: "), {}).values()
+        needed = {"frequency_unit", *(argument for argument, _ in columns)}
+        if above == "surface":
+            needed = set(SPECTRUM)
         default = _default(name, function, argument)
-        if default == "required" and key in {
-            "frequency_unit",
-            *(argument for argument, _ in columns),
-        }:
+        if default == "required" and key in needed:
             default = "required, or `file`"
         found.append((key, unit, default, meaning(function, argument)))
     return found

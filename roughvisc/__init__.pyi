@@ -16,6 +16,7 @@ from roughvisc.judge.plan import plan as plan
 from roughvisc.judge.trade import trade as trade
 from roughvisc.mechanics import closed_forms as closed_forms
 from roughvisc.mechanics.body import Body as Body
+from roughvisc.mechanics.heating import Heating as Heating
 from roughvisc.mechanics.layer import layer as layer
 from roughvisc.mechanics.materials.fractional import fractional_zener as fractional_zener
 from roughvisc.mechanics.materials.material import Prony as Prony
@@ -36,6 +37,7 @@ from roughvisc.mechanics.materials.tables import dynamic_table as dynamic_table
 from roughvisc.mechanics.materials.tables import relaxation_table as relaxation_table
 from roughvisc.mechanics.program import Program as Program
 from roughvisc.mechanics.sheet import sheet as sheet
+from roughvisc.observables.friction_theory import friction_theory as friction_theory
 from roughvisc.plot.report import report as report
 from roughvisc.runs.csv_files import to_csv as to_csv
 from roughvisc.runs.csv_files import to_table as to_table
@@ -66,9 +68,12 @@ from roughvisc.topography.framing import mirror as mirror
 from roughvisc.topography.framing import rotate90 as rotate90
 from roughvisc.topography.inspection import inspect as inspect
 from roughvisc.topography.parameters import parameters as parameters
+from roughvisc.topography.radial_spectrum import join_psd as join_psd
+from roughvisc.topography.radial_spectrum import psd_table as psd_table
 from roughvisc.topography.readers import from_array as from_array
 from roughvisc.topography.recipes import cone as cone
 from roughvisc.topography.recipes import flat_punch as flat_punch
+from roughvisc.topography.recipes import from_spectrum as from_spectrum
 from roughvisc.topography.recipes import self_affine as self_affine
 from roughvisc.topography.recipes import sphere as sphere
 from roughvisc.topography.recipes import surrogates as surrogates

@@ -17,6 +17,7 @@ from roughvisc.experiment.problem import Problem
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.labels import warnings_of
 from roughvisc.mechanics.body import Body
+from roughvisc.mechanics.heating import Heating
 from roughvisc.mechanics.materials.material import Material
 from roughvisc.mechanics.program import Direction, Program
 from roughvisc.settings import Boundary, Edge, Missing, Numerics, Settings
@@ -146,6 +147,7 @@ def friction(
     tolerance: float = Settings.tolerance,
     fields: Sequence[str] | str = (),
     grid_error: bool | Literal["auto"] = Settings.grid_error,
+    heating: Heating | None = None,
     numerics: Numerics = Numerics(),
     threads: int | None = None,
     progress: bool | Progress = True,
@@ -177,6 +179,9 @@ def friction(
         Whether to estimate the grid errors ``grid_error_friction`` and ``grid_error_area`` from the same curve on cells
         twice and four times as long. It takes about a third more time. ``auto``: from
         256 x 256 to 512 x 512 cells.
+    heating : Heating, optional
+        Heat of sliding: the body has the temperature in the mean spot that the heat of friction makes, found by
+        iteration; see Notes. Default: friction does not change the temperature.
     numerics : Numerics
         Settings that are rarely changed; here the device.
     threads : int, optional
@@ -215,7 +220,7 @@ def friction(
     >>> int(ds.friction_coefficient.argmax("speed"))
     1
     """
-    curve = SteadySliding(speeds=speeds, load=load, pressure=pressure, direction=direction)
+    curve = SteadySliding(speeds=speeds, load=load, pressure=pressure, direction=direction, heating=heating)
     settings = {"boundary": boundary, "tolerance": tolerance, "fields": fields, "grid_error": grid_error}
     found = _solved(height, material, curve, settings, numerics, 4, progress=progress, threads=threads)
     return found.assign_attrs(title="Steady sliding")

@@ -26,7 +26,7 @@ ROW, ROWS = "row", "rows"
 #: Dimension of all accepted steps.
 STEP = "step"
 #: Dimensions that a result of one case may have in addition to the dimension of its rows.
-OTHER_DIMS = ("x", "y")
+OTHER_DIMS = ("x", "y", "wavelength")
 
 _GRID = ("x", "y")
 _FRAME = (ROW, "x", "y")
@@ -231,6 +231,7 @@ VARIABLES: dict[str, Variable] = {
     "friction_force_across": Variable(
         _STEPS, "N", "force across the motion", "to the left of the motion", table="value", is_of_steps=True
     ),
+    "temperature": Variable(_SERIES, "K", "temperature of the contact", "of a theory: of its shortest waves"),
     # accuracy and cost
     "stated_error": Variable(
         _SERIES,
@@ -378,6 +379,14 @@ VARIABLES: dict[str, Variable] = {
     "relaxation_modulus_low": Variable(_SERIES, "Pa", "relaxation modulus, low", "lower end of its interval of 90 %"),
     "relaxation_modulus_high": Variable(_SERIES, "Pa", "relaxation modulus, high", "upper end of its interval of 90 %"),
     # theories
+    "wavelength": Variable(("wavelength",), "m", "wavelength", "geometric middle of a decade of waves"),
+    "shortest_wavelength": Variable(("wavelength",), "m", "shortest wavelength", "of a decade of waves"),
+    "longest_wavelength": Variable(("wavelength",), "m", "longest wavelength", "of a decade of waves"),
+    "friction_of_waves": Variable(
+        (ROW, "wavelength"), "1", "contribution to friction", "of a decade of waves; their sum is the coefficient"
+    ),
+    "temperature_of_waves": Variable((ROW, "wavelength"), "K", "temperature of the waves", "in the depth of a decade"),
+    "heat_flux": Variable(_SERIES, "W/m^2", "heat flux", "of friction, into the body, over the nominal area"),
     "persson_contact_area": Variable(_SERIES, "m^2", "contact area, Persson", _ASPERITIES, missing=_FALLEN),
     "asperity_contact_area": Variable(
         _SERIES, "m^2", "contact area, Bush et al.", f"at low loads, {_ASPERITIES}", missing=_FALLEN

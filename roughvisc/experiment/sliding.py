@@ -5,9 +5,9 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -43,6 +43,7 @@ from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.solver import contact_area
 from roughvisc.mechanics.grid import arrays_of, to_host
+from roughvisc.mechanics.heating import Heating, spot_count, surface_rise
 from roughvisc.mechanics.program import Direction
 from roughvisc.mechanics.steady_sliding import Sliding, SteadyState, steady_state
 from roughvisc.mechanics.tangential import slope
@@ -71,6 +72,9 @@ _COUNTING_CAUTION = 1.5
 #: change between the grids, up to the error of an area whose edge lies anywhere in its cells. Of 964 rows of line
 #: contacts 1.1 % then state less than half of the true error of friction, 3.1 % without this term.
 _MEANINGFUL = 0.1
+# Largest difference between the rise of temperature and the rise by the heat of friction: relative, and in kelvin; and
+# most temperatures that are tried.
+_SAME_RISE, _SAME_TEMPERATURE, _MOST_TEMPERATURES = 1e-3, 0.01, 40
 _MORE_INSTANTANEOUS = "a material with more instantaneous compliance"
 
 
@@ -81,7 +85,7 @@ class SteadySliding(Experiment):
 
     Parameters
     ----------
-    speeds, load, pressure, direction
+    speeds, load, pressure, direction, heating
         See :func:`roughvisc.friction`. The speeds become a tuple, in the order given.
 
     Raises
@@ -99,6 +103,7 @@ class SteadySliding(Experiment):
     load: Quantity | None = None
     pressure: Quantity | None = None
     direction: Direction = "x"
+    heating: Heating | None = field(default=None, repr=False)
 
     axis: ClassVar[str] = "speed"
     boundary: ClassVar[Literal["free", "periodic"] | None] = "periodic"
@@ -114,6 +119,8 @@ class SteadySliding(Experiment):
             raise InputError(key="load", expected="a load, or a pressure")
         if self.load is not None and self.pressure is not None:
             raise InputError(key="pressure", found=self.pressure, expected=f"either this or the load, {self.load!r}")
+        if self.heating is not None and not isinstance(self.heating, Heating):
+            raise InputError(key="heating", found=self.heating, expected="rv.Heating(...)")
 
     def __repr__(self) -> str:
         ends = dict.fromkeys(format_quantity(one, "m/s") for one in (min(self.speeds), max(self.speeds)))
@@ -183,6 +190,30 @@ class SlidingGrid:
         return body.over_frequencies(speed * 2 * np.pi * np.fft.fftfreq(self.gap.shape[0], self.spacing[0]), tolerance)
 
 
+class Warm(NamedTuple):
+    """Steady state at a temperature.
+
+    Attributes
+    ----------
+    rise : float
+        Temperature of the body above its temperature far from the contact. [K]
+    seen : float
+        Speed times the shift factor of the temperature, which the material sees. [m/s]
+    law : Body
+        Body whose materials represent its own at this speed.
+    state : SteadyState
+        Steady state.
+    sliding : Sliding
+        Operator of the body at this speed.
+    """
+
+    rise: float
+    seen: float
+    law: Body
+    state: SteadyState
+    sliding: Sliding
+
+
 class SlidingRows(Rows):
     """Steady states of one curve, in the order of the speeds.
 
@@ -221,18 +252,13 @@ class SlidingRows(Rows):
 
     def __iter__(self) -> Iterator[Row]:
         """Slide at each speed."""
-        tolerance, xp = self._settings.tolerance, arrays_of(self._settings.device)
         for done, speed in enumerate(self._curve.speeds[self._done :], self._done + 1):
-            law = self._grids[0].law(self._body, speed, 0.1 * tolerance)  # once per speed: a table needs a fit
+            warm = self._warmed(speed)
             states, runs = [], []
             for cells in self._grids:
-                sliding = Sliding(law, cells.gap.shape, cells.spacing, speed, xp)
-                try:
-                    found = steady_state(sliding, xp.asarray(cells.gap), self._force, tolerance=tolerance)
-                except ConvergenceError as error:
-                    softer = "layers whose moduli differ less" if len(law.materials) > 1 else _MORE_INSTANTANEOUS
-                    advice = f"try a looser tolerance, a coarser grid, or {softer}"
-                    raise ConvergenceError(f"at {format_quantity(speed, 'm/s')}: {error}; {advice}") from error
+                found, sliding = warm.state, warm.sliding
+                if cells is not self._grids[0]:
+                    found, sliding = self._steady(cells, warm.law, speed, warm.seen)
                 pressure, contact = to_host(found.pressure), to_host(found.pressure) > 0
                 gap = np.where(contact, 0.0, np.maximum(cells.gap + to_host(found.displacement) - found.approach, 0.0))
                 counted, area, _ = contact_area(contact, ~contact, math.prod(cells.spacing), "periodic")
@@ -243,11 +269,72 @@ class SlidingRows(Rows):
             if self._settings.grid_error:
                 row |= sliding_grid_errors(self._grids, pressure, runs)
             if stands_alone(self.profile.height, pressure, 0):
-                for one in law.materials:  # without an end of the creep nothing counts as recovered
-                    crept = float(one.contact_compliance(self._period / speed))
+                for one in warm.law.materials:  # without an end of the creep nothing counts as recovered
+                    crept = float(one.contact_compliance(self._period / warm.seen))
                     creep = max(creep, 1.0 - crept / float(one.contact_compliance(math.inf)))
             row["creep_left"] = creep  # left when the next contact arrives
+            if self._curve.heating is not None:
+                row["temperature"] = self._curve.heating.temperature + warm.rise
             yield Row(speed, row, fields, state=done, done=float(done))
+
+    def _steady(self, cells: SlidingGrid, law: Body, speed: float, seen: float) -> tuple[SteadyState, Sliding]:
+        """Return the steady state on a grid at a speed, which the body sees times its shift factor. [m/s]"""
+        xp = arrays_of(self._settings.device)
+        sliding = Sliding(law, cells.gap.shape, cells.spacing, seen, xp)
+        try:
+            state = steady_state(sliding, xp.asarray(cells.gap), self._force, tolerance=self._settings.tolerance)
+        except ConvergenceError as error:
+            softer = "layers whose moduli differ less" if len(law.materials) > 1 else _MORE_INSTANTANEOUS
+            advice = f"try a looser tolerance, a coarser grid, or {softer}"
+            raise ConvergenceError(f"at {format_quantity(speed, 'm/s')}: {error}; {advice}") from error
+        return state, sliding
+
+    def _at(self, speed: float, rise: float) -> Warm:
+        """Return the steady state at a speed [m/s] on the grid of the surface, at a rise of temperature. [K]"""
+        heating, grid = self._curve.heating, self._grids[0]
+        seen = speed if heating is None else speed * float(heating.shift_factor(rise))
+        law = grid.law(self._body, seen, 0.1 * self._settings.tolerance)  # a table needs a fit
+        return Warm(rise, seen, law, *self._steady(grid, law, speed, seen))
+
+    def _warmed(self, speed: float) -> Warm:
+        """Return the steady state at a speed [m/s] and at the temperature that the heat of friction makes.
+
+        Heat reduces friction exponentially. So the method of false position (Illinois) works on the logarithms of the
+        rises. The number of spots jumps where they merge: the interval may end around a jump.
+        """
+        warm = self._at(speed, 0.0)
+        if self._curve.heating is None or (rise := self._rise(warm, speed)) <= _SAME_TEMPERATURE:
+            return warm
+        was_cold = False
+        ends: dict[bool, tuple[float, float]] = {}  # too cold or not -> logarithms of the rise and of its excess
+        for _ in range(_MOST_TEMPERATURES):
+            warm = self._at(speed, rise)
+            excess = math.log(max(self._rise(warm, speed), _SAME_TEMPERATURE**2) / rise)
+            is_cold = excess > 0
+            allowed = max(_SAME_RISE, _SAME_TEMPERATURE / rise)
+            if abs(excess) <= allowed or (len(ends) == 2 and abs(ends[True][0] - ends[False][0]) <= allowed):
+                return warm
+            if len(ends) == 2 and is_cold == was_cold:
+                place, value = ends[not is_cold]
+                ends[not is_cold] = place, value / 2
+            ends[is_cold] = math.log(rise), excess
+            was_cold = is_cold
+            if len(ends) == 1:
+                rise *= math.exp(2 * excess if is_cold else excess)
+            else:
+                (cold, above), (hot, below) = ends[True], ends[False]
+                rise = math.exp((hot * above - cold * below) / (above - below))
+        advice = "try other thermal properties, or a lower speed"
+        raise ConvergenceError(f"at {format_quantity(speed, 'm/s')}: no temperature of the contact; {advice}")
+
+    def _rise(self, warm: Warm, speed: float) -> float:
+        """Return the rise of temperature by the heat of friction at a speed [m/s], in the mean spot. [K]"""
+        heating, pressure = self._curve.heating, to_host(warm.state.pressure)
+        assert heating is not None
+        area = contact_area(pressure > 0, pressure <= 0, math.prod(self._grids[0].spacing), "periodic")[1]
+        radius = math.sqrt(area / (math.pi * spot_count(pressure)))
+        flux = max(warm.state.power_force, 0.0) * speed / area
+        return surface_rise(flux, radius, speed, heating.heat_conductivity, heating.volumetric_heat_capacity)
 
     def _row(
         self, found: SteadyState, sliding: Sliding, pressure: Array, gap: Array, counted: float, area: float

@@ -16,11 +16,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy import fft, ndimage
+from scipy import fft
 
 from roughvisc.errors import InputError
 from roughvisc.experiment.accuracy import loaded_depth
 from roughvisc.mechanics.body import HALF_SPACE
+from roughvisc.mechanics.heating import spot_count, surface_rise
 from roughvisc.mechanics.sheet import BASE, Base, Sheet, factors
 from roughvisc.observables.history import expect_result, history
 from roughvisc.study.case import Case
@@ -272,7 +273,7 @@ def adhesion(scene: Scene) -> Found:
     if not curvature * _FLAT * scene.half_width > 1:
         raise NotKnown("The contact is flat: its pull-off force is not estimated.")
     [w] = scene.need("work_of_adhesion")
-    spots = _spots(scene.pressure)
+    spots = spot_count(scene.pressure)
     pull = spots * 1.5 * math.pi * w / curvature
     held = f"{_counted(spots)} of mean radius {as_text(1 / curvature, 'm')} would hold {as_text(pull, 'N')} when"
     return pull / force, f"{held} pulled off."
@@ -334,17 +335,19 @@ def heating(scene: Scene) -> Found:
     r"""Mean temperature rise of the spots in a slide [K] if all heat flows into the body.
 
     The rise of a slow round spot of radius ``a`` under a heat flux ``q`` is :math:`0.849\,q a / k`, and of a fast one
-    :math:`0.974\,(q a / k) / \sqrt P` with :math:`P = V a \rho c / k` (Jaeger, Archard). Between the limits their
-    inverse squares are added, as Tian and Kennedy, J. Tribol. 116 (1994) 167, propose: the rise is at most 4 % too low.
+    :math:`0.974\,(q a / k) / \sqrt P` with :math:`P = V a \rho c / k` (Jaeger, Archard); see
+    :mod:`roughvisc.mechanics.heating`. The heat of a curve that was computed with ``heating`` is modelled.
     """
     speed, power, rubbed = scene.slide
     if speed == 0:
         return None
-    spots, area, heat = _spots(scene.pressure_in(rubbed)), float(rubbed["contact_area"]), max(power, 0.0)
+    if "temperature" in scene.dataset:
+        warmest = float(scene.dataset["temperature"].max())
+        return 0.0, f"Modelled: the contact is warmed up to {warmest:.4g} K."
+    spots, area, heat = spot_count(scene.pressure_in(rubbed)), float(rubbed["contact_area"]), max(power, 0.0)
     conductivity, capacity = scene.need("heat_conductivity", "volumetric_heat_capacity")
     radius = math.sqrt(area / (math.pi * spots))
-    peclet = speed * radius * capacity / conductivity
-    rise = heat / area * radius / conductivity / math.sqrt(1 / 0.849**2 + peclet / 0.974**2)
+    rise = surface_rise(heat / area, radius, speed, conductivity, capacity)
     heats = f"{as_text(heat, 'W')} of friction heat {_counted(spots).lower()} of mean radius {as_text(radius, 'm')}"
     return rise, f"{heats} by {as_text(rise, 'K')} above the surface around."
 
@@ -396,11 +399,6 @@ def _periodic_relief(scene: Scene, sheet: Sheet) -> float:
     power = np.abs(fft.fft2(pressure - pressure.mean())) ** 2
     lost = power * 2 / q * factors(q * sheet.thickness, sheet.poisson, sheet.base)[1]
     return float(lost.sum() / (pressure.size * pressure.sum()))
-
-
-def _spots(pressure: Array) -> int:
-    """Return the number of connected regions in contact; a region across a periodic border counts twice."""
-    return int(ndimage.label(pressure > 0, np.ones((3, 3)))[1])
 
 
 def _counted(spots: int) -> str:

@@ -111,7 +111,7 @@ def read_record(
         raise InputError(f"{path}: cannot be read as text: {error}", key="path", found=str(path)) from error
     if stated := re.search(r"^# springConstant: (\S+)", text, re.MULTILINE):
         spring = float(stated[1]) if spring is None else spring
-    names = {"time": time, "force": force, "approach": "approach"}
+    names: dict[str, Any] = {"time": time, "force": force, "approach": "approach"}
     for is_export, columns_of_export in _EXPORTS:
         if is_export.search(text):
             names = dict(columns_of_export)
@@ -312,11 +312,12 @@ def fit_material(
     used = weights[first:] > 0
     note = f"{np.count_nonzero(used)} terms fitted to {target.size} rows of an indentation, rms misfit {misfit:.2g} "
     note += f"of the largest {'power of the depth' if is_creep else 'force'}; known up to {known.time[-1]:.3g} s"
-    series = weights[first:][used], times[used], poisson
+    strengths: Any = weights[first:][used]
+    own_times: Any = times[used]
     if is_creep:
-        material = Prony(weights[0], weights[1] / rows.length, *series, note=note)
+        material = Prony(float(weights[0]), float(weights[1]) / rows.length, strengths, own_times, poisson, note=note)
     else:
-        material = relaxation_series(float(weights[0]), *series, note=note)
+        material = relaxation_series(float(weights[0]), strengths, own_times, poisson, note=note)
     ends = {"": known.modulus, "_low": known.low, "_high": known.high}
     described = {f"relaxation_modulus{end}": ("time", values[is_known]) for end, values in ends.items()}
     return MaterialFit(
@@ -330,7 +331,7 @@ def fit_material(
 
 def _elastic_contact(tip: Any, poisson: float) -> tuple[float, float]:
     """Return ``k`` and ``n`` of the elastic contact, ``F = k G depth^n``."""
-    known = indenter_of(tip)
+    known: Any = indenter_of(tip)
     about = known[0].keywords if known is not None else {}
     if "slope" in about:
         return 4 / (np.pi * about["slope"] * (1 - poisson)), 2.0

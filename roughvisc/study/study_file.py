@@ -48,6 +48,7 @@ from roughvisc.study.machine_history import read_history
 from roughvisc.study.material_file import with_columns
 from roughvisc.study.properties import properties
 from roughvisc.study.sweep_table import value_at
+from roughvisc.tables import Wanted, read_table
 from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.framing import combine
 from roughvisc.topography.recipes import RECIPES
@@ -79,6 +80,9 @@ _SOFTEST = 100.0
 #: Largest excess of a kept time over the end of a program, relative to the duration.
 _ROUNDING = 1e-12
 
+
+#: Columns of the CSV file of ``generate = "spectrum"``, by argument.
+SPECTRUM = {"wavevectors": Wanted("wavevector", "1/m"), "densities": Wanted("density", "m^4")}
 
 # ----------------------------------------------------------------------------------------------------------------
 # units
@@ -201,6 +205,7 @@ def with_files(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
         if name not in data:
             raise InputError(f"{name}: missing: expected a table [{name}]", key=name, expected=f"a table [{name}]")
     tables = in_si(data, "", data, folder)
+    tables["surface"] = with_spectrum("surface", tables["surface"])
     tables["material"] = with_columns("material", tables["material"])
     if isinstance(segments := tables.get("program"), list):
         for place, stated in enumerate(segments):
@@ -227,6 +232,25 @@ def without_late_times(tables: Mapping[str, Any]) -> tuple[dict[str, Any], tuple
         return dict(tables), ()
     kept = [time for time in times if time not in late]
     return {**tables, "keep": {**tables["keep"], "times": kept}}, tuple(late)
+
+
+def with_spectrum(where: str, stated: Any) -> Any:
+    """Return a table of a surface with the columns of the CSV file of its spectrum, without the name of the file."""
+    if not isinstance(stated, Mapping):
+        return stated
+    table = dict(stated)
+    if "second" in table:
+        table["second"] = with_spectrum(f"{where}.second", table["second"])
+    if table.get("generate") != "spectrum" or "file" not in table:
+        return table
+    file = table.pop("file")
+    for key in SPECTRUM.keys() & table.keys():
+        raise InputError(key=f"{where}.file", found=file, expected=f"either a file or {key}")
+    try:
+        columns, _ = read_table(file, SPECTRUM)
+    except InputError as error:
+        raise located(error, f"{where}.file") from error
+    return table | {key: values.tolist() for key, values in columns.items()}
 
 
 def with_rows(where: str, stated: Any) -> Any:

@@ -154,8 +154,9 @@ def _realisations(
         surrogates = [{SURROGATE: number} for number in range(ITSELF + 1, count + 1)]
         return [(change | one, {REALISATION: number}) for number, one in enumerate([{}, *surrogates], ITSELF)]
     made, seed = surface.get("generate"), surface.get("seed")
-    if made != "self_affine" or "second" in surface:
-        raise InputError(key=where, found=f"generate = {made!r}", expected="a scan, or one face of 'self_affine'")
+    if made not in ("self_affine", "spectrum") or "second" in surface:
+        expected = "a scan, or one face of 'self_affine' or 'spectrum'"
+        raise InputError(key=where, found=f"generate = {made!r}", expected=expected)
     if not isinstance(seed, int) or "amplitudes" not in surface:
         kinds = "'gaussian' for patches of a surface, or 'fixed' for surfaces of one rms height"
         raise InputError(key=where, found=count, expected=f"a whole number as seed, and amplitudes: {kinds}")

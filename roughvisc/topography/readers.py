@@ -80,7 +80,8 @@ def read_file(path: Path, given: Mapping[str, Any]) -> xr.DataArray:
 def _labelled(file: ScanFile, channel: Channel, given: Mapping[str, Any]) -> xr.DataArray:
     """Return the heights of a channel over x and y; refuse implausible ones. [m]"""
     xy, z = _metres(channel, given)
-    grid, no_data = given.get("grid"), given.get("no_data")
+    grid: Any = given.get("grid")
+    no_data = given.get("no_data")
     spacing = pair("spacing", given["spacing"]) if "spacing" in given else None
     if grid is None and channel.kind == "triangles":
         raise InputError(key="grid", found=grid, expected="the side of the cells, for a mesh of triangles")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from numbers import Integral
@@ -23,7 +23,9 @@ from roughvisc.errors import InputError
 from roughvisc.topography.borders import is_mirrored, is_periodic, period_of
 from roughvisc.topography.framing import mirror
 from roughvisc.topography.grid import checked, counts, labelled, noted, pair, spacing, with_coordinates
-from roughvisc.topography.spectrum import psd, ring_numbers, wavevectors
+from roughvisc.topography.radial_spectrum import Convention, density_at, psd_table
+from roughvisc.topography.spectrum import psd, ring_numbers
+from roughvisc.topography.spectrum import wavevectors as waves_of_grid
 from roughvisc.units import Quantity, format_quantity, number, quantities
 
 #: Largest number of cells of an indenter on a larger grid.
@@ -243,7 +245,7 @@ def self_affine(
         rolloff = number(rolloff, "m", "rolloff", least=shortcut)
     band = (0.0 if rolloff is None else 2 * np.pi / rolloff, 2 * np.pi / shortcut)
     entropy = np.random.default_rng(seed).integers(1 << 32, size=4).tolist()
-    q_x, q_y, weight = wavevectors(shape, sides)
+    q_x, q_y, weight = waves_of_grid(shape, sides)
     q = np.hypot(q_x[:, None] * stretch[0], q_y * stretch[1]) / band[1]
     inside = (q > 0) & (q < 1 - 1e-12)  # the Nyquist rows, which have no sine, are outside
     amplitude = np.zeros(q.shape)
@@ -261,6 +263,80 @@ def self_affine(
     parameters = {"hurst": hurst, "rms_slope": rms_slope, "rms_height": rms_height, "rolloff": rolloff}
     parameters |= {"shortcut": shortcut, "anisotropy": anisotropy, "amplitudes": amplitudes, "seed": stated_seed}
     return generated(heights, "self_affine", parameters, size, period=list(size))
+
+
+@quantities(size="m", wavevectors="1/m ...", densities="m^4 ...")
+def from_spectrum(
+    size: Any,
+    shape: Any,
+    *,
+    wavevectors: Sequence[Quantity],
+    densities: Sequence[Quantity],
+    convention: Convention,
+    amplitudes: Literal["fixed", "gaussian"] = "fixed",
+    seed: int,
+) -> xr.DataArray:
+    r"""Generate a periodic surface with a radial spectrum, such as a part of the spectrum of a road.
+
+    Parameters
+    ----------
+    size : float or str, or a pair
+        Sides of the domain. [m]
+    shape : int or pair of int
+        Number of cells ``(nx, ny)``.
+    wavevectors : sequence of float or str
+        Wave numbers :math:`q = 2 \pi / \lambda`, ascending. [rad/m]
+    densities : sequence of float or str
+        Two-dimensional isotropic density ``C(q)``, a power law between rows and zero outside. [m4]
+    convention : {"psd", "persson"}
+        Convention of the densities, see :func:`roughvisc.psd_table`.
+    amplitudes : {"fixed", "gaussian"}, default "fixed"
+        As in :func:`roughvisc.self_affine`.
+    seed : int
+        Source of random phases. A seed defines one surface: a finer grid of the same size adds shorter waves.
+
+    Returns
+    -------
+    xarray.DataArray
+        Height over (x, y), with zero mean, with the waves of the spectrum that are longer than two cells. [m]
+
+    Raises
+    ------
+    InputError
+        If a parameter is out of range, or no wave of the domain is in the spectrum.
+
+    Notes
+    -----
+    A wave has the mean square amplitude :math:`C(q) / A` on the area :math:`A`, in the convention of
+    :func:`roughvisc.psd`.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> road = rv.from_spectrum(1e-3, 64, wavevectors=[1e4, 1e5], densities=[1e-19, 1e-23], convention="psd", seed=1)
+    >>> road.shape
+    (64, 64)
+    """
+    size = pair("size", size)
+    stated_seed = whole("seed", seed)
+    one_of("amplitudes", amplitudes, ("fixed", "gaussian"))
+    spectrum = psd_table(wavevectors, densities, convention=convention)
+    shape = cells(shape, least=2)
+    sides = size[0] / shape[0], size[1] / shape[1]
+    q_x, q_y, _ = waves_of_grid(shape, sides)
+    q = np.hypot(q_x[:, None], q_y)
+    inside = (q > 0) & (q < np.pi / max(sides) * (1 - 1e-12))  # the waves of two cells have no sine
+    amplitude = np.zeros(q.shape)
+    amplitude[inside] = np.sqrt(density_at(spectrum, q[inside]) / math.prod(size))
+    if not amplitude.any():
+        ends = (format_quantity(float(2 * np.pi / q), "m") for q in spectrum["wavevector"].values[[-1, 0]])
+        expected = f"a grid with waves of the spectrum, {' to '.join(ends)}"
+        raise InputError(key="size", found=size, expected=expected)
+    entropy = np.random.default_rng(stated_seed).integers(1 << 32, size=4).tolist()
+    heights = random_heights(amplitude, shape[1], entropy, normal=amplitudes == "gaussian")
+    stated: dict[str, Any] = {"wavevectors": list(map(float, wavevectors)), "densities": list(map(float, densities))}
+    stated |= {"convention": convention, "amplitudes": amplitudes, "seed": stated_seed}
+    return generated(heights, "spectrum", stated, size, period=list(size))
 
 
 # ------------------------------------------------------------------------------------------------------------ indenters
@@ -408,7 +484,7 @@ def surrogate(h: xr.DataArray, number: int, *, seed: int = 0) -> xr.DataArray:
     repeating = h if is_periodic(h) else mirror(h)
     spectrum, step = psd(repeating), 2 * np.pi / min(period_of(repeating))  # the width of its rings
     sides = spacing(h)
-    q_x, q_y, _ = wavevectors(h.shape, sides)
+    q_x, q_y, _ = waves_of_grid(h.shape, sides)
     q = np.hypot(q_x[:, None], q_y)
     rings = ring_numbers(spectrum["wavevector"].values, step)
     density = np.zeros(rings[-1] + 1)
@@ -518,7 +594,7 @@ def whole(key: str, value: Any, least: int = 0) -> int:
 #: Function of each recipe, by its name in surface cards and studies.
 RECIPES: dict[str, Callable[..., xr.DataArray]] = {
     recipe.__name__: recipe for recipe in (sphere, cone, flat_punch, wavy, self_affine)
-}
+} | {"spectrum": from_spectrum}
 #: Boundary for which the surfaces of each recipe are made.
 BOUNDARIES: dict[str, str] = {name: "free" if name in _INDENTERS else "periodic" for name in RECIPES}
 
@@ -541,6 +617,6 @@ def check_recipe(where: str, table: Mapping[str, Any]) -> None:
     recipe = RECIPES[one_of(f"{where}.generate", table["generate"], RECIPES)]
     _, stated = split(table, "generate")
     check_keys(recipe, where, stated)
-    counts(f"{where}.shape", stated["shape"], low=2 if recipe is self_affine else 1)
+    counts(f"{where}.shape", stated["shape"], low=2 if recipe in (self_affine, from_spectrum) else 1)
     with suppress(DataNeeded):
         call(recipe, where, stated | {"shape": NoData()})

@@ -88,3 +88,7 @@ def test_sum__is_the_integral_over_an_isotropic_spectrum():
         integral = np.trapezoid(lost * erf(1 / (2 * np.sqrt(g))), inside)
     assert area < 0.7
     assert friction == pytest.approx(2e-8 / (2 * pressure) * integral, rel=0.01)
+    spectrum = rv.psd_table([low, high], [2e-8 / low**3, 2e-8 / high**3], convention="persson")
+    ds = rv.friction_theory(spectrum, RUBBER, speeds=SPEED, pressure=pressure, dissipation_factor=1)
+    assert ds.friction_coefficient[0] == pytest.approx(2e-8 / (2 * pressure) * integral, rel=1e-3)
+    assert ds.contact_fraction[0] == pytest.approx(area, rel=0.01)

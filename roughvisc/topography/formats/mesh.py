@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -53,7 +54,7 @@ def read_ply(path: Path) -> ScanFile:
         place += words[:1] == ["element"]
         if words[:1] == ["property"]:
             elements[place][2].append(words[1:])
-    rows = {}
+    rows: dict[str, Any] = {}
     numbers = np.array(body.split(), dtype=float) if notation == "ascii" else np.zeros(0)
     position = 0
     for name, count, properties in elements:
