@@ -344,10 +344,20 @@ class Export(NamedTuple):
 
 
 #: Spellings of units that the registry of units lacks, or that mean another unit there.
-_SPELLINGS = {"C": "degC", "°C": "degC", "deg C": "degC", "K": "K", "-": "1", "[-]": "1", "sec": "s", "Sec": "s"}
+_SPELLINGS = {
+    "C": "degC",
+    "°C": "degC",
+    "deg C": "degC",
+    "F": "degF",
+    "°F": "degF",
+    "-": "1",
+    "[-]": "1",
+    "sec": "s",
+    "Sec": "s",
+}
 _SPELLINGS |= dict.fromkeys(("rad/sec", "rad s-1", "rad s^-1", "rad*s^-1", "rad·s⁻¹", "rad s⁻¹", "1/s·rad"), "rad/s")
 #: Kinds of units that test machines write.
-_KINDS_OF_UNITS = ("s", "1/s", "Pa", "1/Pa", "Pa s", "K", "m", "N")
+_KINDS_OF_UNITS = ("1", "s", "1/s", "Pa", "1/Pa", "Pa s", "K", "m", "N")
 #: A cell that looks like a number, but not like a unit such as ``1/MPa``.
 _LIKE_A_NUMBER = re.compile(r"[+-]?[.,]?\d[^A-DF-Za-df-zµ°%/]*")
 #: Largest number of rows of units below the names, and of lines that a note lists.
@@ -579,7 +589,8 @@ def _export_unit(
     if not unit:
         example = f"{title} [{one.unit or 'Hz'}]" + (" or [rad/s]" if not one.unit else "")
         expected = f"the unit in the name of the column, {example!r}"
-        message = f"{path}, line {line}: found the column {name!r} without a unit: expected {expected}"
+        other = f", only {' and '.join(map(repr, filter(None, below)))} below" if any(below) else ""
+        message = f"{path}, line {line}: found the column {name!r} without a unit{other}: expected {expected}"
         raise InputError(message, found=name, expected=expected)
     if unit == one.unit or not one.unit:
         return unit, float

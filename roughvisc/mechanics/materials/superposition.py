@@ -104,7 +104,8 @@ class Superposition:
         """Return ``a_T`` at a temperature [K], interpolated: ``log a_T`` is linear in ``1/T`` between temperatures."""
         lowest, highest = self.bounds
         if not lowest <= temperature <= highest:
-            expected = f"a measured temperature, {lowest - 273.15:.4g} to {highest - 273.15:.4g} degC"
+            celsius = f"{lowest - 273.15:.4g} to {highest - 273.15:.4g} degC"
+            expected = f"a measured temperature [K], {lowest:.2f} to {highest:.2f} K ({celsius})"
             raise InputError(key="temperature", found=temperature, expected=expected)
         return float(10 ** np.interp(-1 / temperature, -1 / self.temperatures, self.log_shift))
 
