@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from roughvisc.mechanics.grid import fft_of
-from roughvisc.mechanics.memory import STIFF, LayerMemory
+from roughvisc.mechanics.memory import STIFF, LayerMemory, Memory
 from roughvisc.mechanics.program import Slide
 from roughvisc.mechanics.scene import SOFT, Point, Scene
 from roughvisc.mechanics.tangential import tangential_force
@@ -315,11 +315,14 @@ def work_of_pair(
 def transient_error(scene: Scene, start: Point, first: Point, end: Point, *, by_load: bool) -> float:
     """Return the error of the work of a pair after a corner, due to a transient that is over within a step. [J]
 
-    At a corner the rate of the prescribed quantity changes. A force that relaxes within the first step then has an
-    error of the size of the relaxed part ``1 - h R(h) / S(h)`` of its change, with the relaxation function ``R`` and
-    its integral ``S``, twice as much if the rate changes its sign. It remains to the end of the pair. Under a given
-    load the approach is right at both points, and follows the integral of the compliance, ``S``, between them. ``begin
-    + a t + b S(t)`` through the three points of a pair has another integral than the parabola.
+    At a corner the rate of the prescribed quantity changes. A given approach then adds to the force a part that follows
+    ``S(t)``, the integral of the relaxation function. With a pressure that is linear within the step, this part is
+    ``t^2 / I(t)`` after the first step instead, with the integral ``I`` of the compliance, and the work has the integral
+    of a parabola in place of that of ``S``. Both errors count twice, because the rate may change its sign. If the
+    compliance grows much within the step, the error may be as large as the part ``1 - h R(h) / S(h)`` of the force that
+    relaxes in it, with the relaxation function ``R``. It remains to the end of the pair. Under a given load the approach
+    is right at both points, and follows ``I`` between them. ``begin + a t + b I(t)`` through the three points of a pair
+    has another integral than the parabola.
 
     Parameters
     ----------
@@ -333,10 +336,11 @@ def transient_error(scene: Scene, start: Point, first: Point, end: Point, *, by_
     if first.is_open or end.is_open:
         return 0.0
     early, last = first.time - start.time, end.time - start.time
+    memory, is_stiff = scene.memory, scene.memory.may_ring and scene.memory.grows(early, STIFF)
     if not by_load:
-        relaxed = 1 - early * scene.memory.relaxation(early) / float(scene.memory.relaxed(early)[0])
-        return 2 * relaxed * abs(first.force - start.force) * abs(end.approach - touch(scene, start))
-    integral, twice = scene.memory.crept([early, last])
+        part = part_relaxed(memory, early) if is_stiff else part_missed(memory, early, last)
+        return 2 * part * abs(first.force - start.force) * abs(end.approach - touch(scene, start))
+    integral, twice = memory.crept([early, last])
     determinant = early * integral[1] - last * integral[0]
     if abs(determinant) <= 1e-9 * last * abs(integral[1]):
         return 0.0
@@ -348,10 +352,34 @@ def transient_error(scene: Scene, start: Point, first: Point, end: Point, *, by_
     bend = (changes[1] / last - changes[0] / early) / (last - early)
     smooth = (changes[0] / early - bend * early) * last**2 / 2 + bend * last**3 / 3
     error = abs(modal - smooth) / last
-    if scene.memory.may_ring and scene.memory.grows(early, STIFF):  # the first step takes the pressure as constant
+    if is_stiff:  # the first step takes the pressure as constant
         missed = 1 - (integral[1] - integral[0]) / (last - early) * last / integral[1]
         error = max(error, 2 / 3 * abs(missed * changes[1]))  # the weight of the first step in the parabola
     return float(error * abs(end.force - start.force))
+
+
+def part_relaxed(memory: Memory, step: float) -> float:
+    """Return the part of the change of a force under a steady approach that relaxes within a step. [s]"""
+    return 1 - step * memory.relaxation(step) / float(memory.relaxed(step)[0])
+
+
+def part_missed(memory: Memory, early: float, last: float) -> float:
+    """Return the error of a force under a steady approach, and of its integral, as a part of its change.
+
+    Parameters
+    ----------
+    memory : Memory
+        Memory of the body.
+    early, last : float
+        Time from the corner to the end of the first step, and of the second. [s]
+    """
+    if not memory.relaxing.any():  # no relaxation function is known
+        return 0.0
+    integral, twice = memory.relaxed([early, last])
+    of_force = abs(1 - integral[0] * float(memory.crept(early)[0]) / (memory.glassy * early**2))
+    bend = (integral[1] / last - integral[0] / early) / (last - early)
+    smooth = (integral[0] / early - bend * early) * last**2 / 2 + bend * last**3 / 3
+    return of_force + abs(twice[1] - smooth) / (last * integral[0])
 
 
 def work_of_step(scene: Scene, before: Point, after: Point, slides: bool = False) -> float:
