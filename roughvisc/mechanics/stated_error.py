@@ -317,12 +317,13 @@ def transient_error(scene: Scene, start: Point, first: Point, end: Point, *, by_
 
     At a corner the rate of the prescribed quantity changes. A given approach then adds to the force a part that follows
     ``S(t)``, the integral of the relaxation function. With a pressure that is linear within the step, this part is
-    ``t^2 / I(t)`` after the first step instead, with the integral ``I`` of the compliance, and the work has the integral
-    of a parabola in place of that of ``S``. Both errors count twice, because the rate may change its sign. If the
+    ``h^2 / I(h)`` after the first step instead, with the integral ``I`` of the compliance. The work has the integral of
+    a parabola in place of the integral of ``S``. Both errors count twice, because the rate may change its sign. If the
     compliance grows much within the step, the error may be as large as the part ``1 - h R(h) / S(h)`` of the force that
-    relaxes in it, with the relaxation function ``R``. It remains to the end of the pair. Under a given load the approach
-    is right at both points, and follows ``I`` between them. ``begin + a t + b I(t)`` through the three points of a pair
-    has another integral than the parabola.
+    relaxes in it, with the relaxation function ``R``. It remains to the end of the pair.
+
+    Under a given load the approach is right at both points, and follows ``I`` between them. ``begin + a t + b I(t)``
+    through the three points of a pair has another integral than the parabola.
 
     Parameters
     ----------
