@@ -75,25 +75,30 @@ class Difference:
     friction: float = 0.0
     shared: float = 0.0
 
-    def at_least(self, before: Difference, left: float, left_of_friction: float = 0.0) -> Difference:
-        """Return the errors, each at least a part of the error before a pair.
+    def at_least(
+        self, former: Difference, left: float, left_of_friction: float = 0.0, *, is_soft: bool = False
+    ) -> Difference:
+        """Return the errors, each at least a part of the error before a pair; both shared errors add up.
 
         Parameters
         ----------
-        before : Difference
+        former : Difference
             Errors before the pair.
         left : float
             Part of an error of the pressure that relaxation leaves until the end of the pair.
         left_of_friction : float
             Part of the friction force that is left, see :func:`left_of_friction`.
+        is_soft : bool
+            Whether hardly any of the compliance is instantaneous: only the shared error fades then.
         """
-        part = LASTING * left
+        part = LASTING if is_soft else LASTING * left
         return replace(
             self,
-            pressure=max(self.pressure, part * before.pressure),
-            force=max(self.force, part * before.force),
-            approach=max(self.approach, LASTING * before.approach),
-            friction=max(self.friction, max(left, left_of_friction) * before.friction),  # both may share all of it
+            pressure=max(self.pressure, part * former.pressure),
+            force=max(self.force, part * former.force),
+            approach=max(self.approach, LASTING * former.approach),
+            friction=max(self.friction, max(left, left_of_friction) * former.friction),  # both may share all of it
+            shared=self.shared + left * former.shared,
         )
 
     def or_larger(self, other: Difference, part: float = 1.0) -> Difference:
@@ -129,29 +134,29 @@ def difference(
         return Difference()
     grid, (stated, of_approach) = scene.grid, stated_parts(scene)
     pressure, other = fine.pressure, coarse.pressure
-    apart = Difference(
+    error = Difference(
         pressure=stated * (float(abs(pressure - other).sum()) * grid.cell_area),
         force=stated * abs(fine.force - coarse.force),
         approach=of_approach * abs(fine.approach - coarse.approach),
     )
     if slide is not None:
         of_friction = abs(friction(scene, fine, slide) - friction(scene, coarse, slide))
-        apart = replace(apart, friction=of_friction)
+        error = replace(error, friction=of_friction)
     if not is_kept or (fine.is_open and coarse.is_open):
-        return apart
+        return error
     gap = scene.gap + scene.memory.displacement(fine.history)[0] - fine.approach
     gap_of_coarse = scene.gap + scene.memory.displacement(coarse.history)[0] - coarse.approach
-    contact = pressure > 0
+    contact = fine.contact
     inside = contact & (pressure <= abs(pressure - other))
-    outside = ~contact & ((other > 0) | (gap <= abs(gap - gap_of_coarse)))
+    outside = ~contact & (coarse.contact | (gap <= abs(gap - gap_of_coarse)))
     if scene.present is not None:
         outside &= scene.present
     cells, uncertain = int(contact.sum()), 0.0
     if cells and scene.memory.grows(fine.time - before.time, SOFT):
         uncertain = entering(scene, before, fine) + ENTERING * float(outside.sum()) * fine.force / cells
     return replace(
-        apart,
-        pressure=apart.pressure + uncertain,
+        error,
+        pressure=error.pressure + uncertain,
         inside=grid.cell_area * float(inside.sum()),
         outside=grid.cell_area * float(outside.sum()),
     )
@@ -172,7 +177,7 @@ def entered_early(scene: Scene, before: Point, after: Point) -> float:
 
 def force_of_entered(scene: Scene, before: Point, after: Point) -> float:
     """Return the force on the cells that have entered between two points. [N]"""
-    return float(after.pressure[before.pressure == 0].sum()) * scene.grid.cell_area
+    return float(after.pressure[~before.contact].sum()) * scene.grid.cell_area
 
 
 # ---------------------------------------------------------------------------------------------------------- friction
@@ -278,13 +283,13 @@ def work_of_pair(
     straight = np.cumsum([work_of_step(scene, start, first), work_of_step(scene, first, end)]).tolist()
     begin = np.array([first.force if start.is_late else start.force, touch(scene, start)])
     changes = np.array([[point.force, touch(scene, point)] for point in (first, end)]) - begin
-    is_over_time = end.force > 0
+    is_over_time = not end.is_open
 
     def parameter(point: Point) -> float:
         return point.time - start.time if is_over_time else touch(scene, point) - float(begin[1])
 
     early, last = parameter(first), parameter(end)
-    is_curved = first.force > 0 and LEAST_PART * last**2 < early * last < (1 - LEAST_PART) * last**2
+    is_curved = not first.is_open and LEAST_PART * last**2 < early * last < (1 - LEAST_PART) * last**2
     if is_curved:
         bends = (changes[1] / last - changes[0] / early) / (last - early)
         slopes = changes[0] / early - bends * early

@@ -17,7 +17,7 @@ RESOLVED = 1.5
 #: Part of the tolerance that a pair may add to the error: usually, and for bodies with hardly any instantaneous
 #: compliance. With 0.4, one in eight cases of such bodies has a row beyond the tolerance. With 0.2 a third to a half of
 #: these cases are within it, for 1.1 times the convolutions; with 0.1 three in five, for 1.26 times.
-SHARE, SHARE_SOFT = 0.3, 0.2
+ALLOWED, ALLOWED_SOFT = 0.3, 0.2
 #: Order of the error of a pair in its length, observed: cells enter and leave the contact within steps.
 ORDER = 1.5
 #: Safety factor of the length of the next pair.
@@ -52,7 +52,7 @@ class Pair:
 
     Attributes
     ----------
-    before, coarse_before : Point
+    start, coarse_start : Point
         Both solutions before the pair.
     first, second : Point
         Fine solution after each step.
@@ -62,8 +62,8 @@ class Pair:
         Whether hardly any of the compliance of the pair is instantaneous.
     """
 
-    before: Point
-    coarse_before: Point
+    start: Point
+    coarse_start: Point
     first: Point
     second: Point
     once: Point
@@ -72,11 +72,11 @@ class Pair:
     @property
     def length(self) -> float:
         """Length of the pair. [s]"""
-        return self.second.time - self.before.time
+        return self.second.time - self.start.time
 
     def receding(self) -> bool:
         """Return whether cells have left the contact."""
-        return bool((self.before.contact & ~self.second.contact).any())
+        return bool((self.start.contact & ~self.second.contact).any())
 
 
 @dataclass(frozen=True)
@@ -172,7 +172,14 @@ def pair_ends(scene: Scene, number: int, now: float, length: float, *, is_first:
 
 
 def errors_over_allowed(
-    scene: Scene, pair: Pair, number: int, error: Difference, shared: float, kept: tuple[float, float], *, lands: bool
+    scene: Scene,
+    pair: Pair,
+    number: int,
+    error: Difference,
+    shared: float,
+    largest: tuple[float, float],
+    *,
+    lands: bool,
 ) -> tuple[float, float]:
     """Return the error that a pair adds at the next kept time, and its error at a kept row, over the allowed errors.
 
@@ -191,15 +198,15 @@ def errors_over_allowed(
         Stated error at the end of the pair.
     shared : float
         Error of the pressure that both solutions share. [N]
-    kept : tuple of float
+    largest : tuple of float
         Largest force and approach of the kept rows so far; a given approach is the largest of all steps. [N, m]
     lands : bool
         Whether the pair contains a kept row.
     """
     second, taken, memory = pair.second, pair.length, scene.memory
-    force = max(kept[0], pair.first.force, second.force, 1e-300)
+    force = max(largest[0], pair.first.force, second.force, 1e-300)
     rounding = ROUNDING * memory.compliance(second.time) * scene.grid.largest_eigenvalue * force / scene.gap.size
-    approach = max(kept[1], abs(pair.first.approach), abs(second.approach), rounding / scene.grid.cell_area, 1e-300)
+    approach = max(largest[1], abs(pair.first.approach), abs(second.approach), rounding / scene.grid.cell_area, 1e-300)
 
     row, (stated, of_approach) = 0.0, stated_parts(scene)
     if lands and scene.keeps(second.time) and taken > LANDING_PAIR * (second.time - scene.program.corners[number]):
@@ -209,8 +216,8 @@ def errors_over_allowed(
     following = second.time if lands else min(scene.next_kept(second.time), scene.program.duration)
     ahead = growth_until(scene, number, second, following)
     scales = max(force, second.force * ahead), max(approach, abs(second.approach) * ahead**0.5)
-    share = SHARE_SOFT if scene.is_soft else SHARE
-    return added(scene, pair, number, following, scales) / (share * scene.tolerance), row
+    part = ALLOWED_SOFT if scene.is_soft else ALLOWED
+    return added(scene, pair, number, following, scales) / (part * scene.tolerance), row
 
 
 def growth_until(scene: Scene, number: int, point: Point, following: float) -> float:
@@ -239,21 +246,21 @@ def added(scene: Scene, pair: Pair, number: int, following: float, scales: tuple
     memory, second, once, taken = scene.memory, pair.second, pair.once, pair.length
     is_soft, by_load = pair.is_soft, scene.program.segments[number].control == "load"
     receding = pair.receding()
-    after = second.pressure - once.pressure
-    before = pair.before.pressure - pair.coarse_before.pressure
-    change = float(abs(after - before).sum())
+    at_end = second.pressure - once.pressure
+    at_start = pair.start.pressure - pair.coarse_start.pressure
+    change = float(abs(at_end - at_start).sum())
     if is_soft:
         remains = memory.compliance(taken) / memory.compliance(following - second.time + taken)
         remains = 1.0 if receding else remains
     else:
-        change = min(change, float(abs(after - memory.remaining(taken) * before).sum()))
+        change = min(change, float(abs(at_end - memory.remaining(taken) * at_start).sum()))
         remains = max(memory.remaining(following - second.time), LEAST_REMAINING)
-    largest = change * scene.grid.cell_area / scales[0] * remains
+    error = change * scene.grid.cell_area / scales[0] * remains
     if by_load:
-        of_approach = (second.approach - once.approach) - (pair.before.approach - pair.coarse_before.approach)
-        largest = max(largest, abs(of_approach) / scales[1])
+        of_approach = (second.approach - once.approach) - (pair.start.approach - pair.coarse_start.approach)
+        error = max(error, abs(of_approach) / scales[1])
     if not by_load or second.is_open or is_soft:
         surface = memory.displacement(second.history)[0] - memory.displacement(once.history)[0]
-        surface -= memory.displacement(pair.before.history)[0] - memory.displacement(pair.coarse_before.history)[0]
-        largest = max(largest, float(abs(surface).max()) / scales[1] * (1.0 if is_soft or receding else remains))
-    return largest
+        surface -= memory.displacement(pair.start.history)[0] - memory.displacement(pair.coarse_start.history)[0]
+        error = max(error, float(abs(surface).max()) / scales[1] * (1.0 if is_soft or receding else remains))
+    return error
