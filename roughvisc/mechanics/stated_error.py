@@ -40,11 +40,10 @@ ENTERED = 0.3
 SHARED = 0.1
 #: Pressure of a cell that may have entered the contact of a soft body, over the mean pressure.
 ENTERING = 2.5
-#: Error of the pressure after a slide by one cell, which has no coarse solution, as a part of the change of pressure.
-OF_ONE_CELL = 0.25
-#: Error of the work if the force is taken as linear over the approach and vanishes at one end, as a part of this work.
-#: On a sphere it is a fifth, on a cone a third.
-STRAIGHT = 0.25
+#: Error of a quantity that has no second solution, as a part of it. The change of the pressure in a slide by one cell,
+#: and the work of a force that is taken as linear over the approach and vanishes at one end: on a sphere the error is a
+#: fifth of it, on a cone a third.
+UNBOUNDED = 0.25
 #: Force and approach are parabolas over a pair only if each of its steps covers at least this part of it.
 LEAST_PART = 0.1
 
@@ -296,7 +295,7 @@ def work_of_pair(
         is_curved = is_over_time or float(slopes[0] * (slopes[0] + 2 * bends[0] * last)) > 0
     if not is_curved:
         forces = [float(begin[0]), first.force, end.force]
-        uncertain = STRAIGHT * (1 - min(forces) / max(*forces, 1e-300))
+        uncertain = UNBOUNDED * (1 - min(forces) / max(*forces, 1e-300))
         path = [start, *points]
         works = np.cumsum([work_of_step(scene, *ends) for ends in zip(path, points, strict=False)]).tolist()
         return works, uncertain * abs(straight[0]), uncertain * abs(straight[1])

@@ -29,7 +29,7 @@ from roughvisc.mechanics.program import Segment, Slide, instant
 from roughvisc.mechanics.scene import SOFT, Array, Packed, Point, Scene
 from roughvisc.mechanics.stated_error import (
     LASTING,
-    OF_ONE_CELL,
+    UNBOUNDED,
     Difference,
     difference,
     entered_early,
@@ -47,6 +47,7 @@ from roughvisc.mechanics.step_control import (
     GROW,
     PAIRS_OF_A_CYCLE,
     ROUNDED,
+    SHORTEST_PAIR,
     Controller,
     Pair,
     errors_over_allowed,
@@ -64,14 +65,10 @@ PACKED_FROM = 1024**2
 #: Tolerance of the contact solver over the tolerance of the run: usually, and in a slide. A step of a slow slide
 #: changes the pressure little, and the friction force is a small part of the load.
 SOLVER_PART, SLIDING_PART = 0.2, 0.06
-#: Length of the additional step that gives the pressure at the end of a soft step, as a part of the soft step.
+#: Length of the additional step that gives the pressure at the end of a soft step, as a part of the soft step. Also
+#: the tolerance of the contact solver in the soft step over the tolerance of the run: the additional step magnifies the
+#: residual.
 END_STEP = 1e-3
-#: Tolerance of the contact solver over the tolerance of the run in a soft step with a kept row: the additional step
-#: magnifies the residual.
-MAGNIFIED = 6e-4
-#: Error of the time at which an open contact closes, as a part of the time to the next event. Surfaces that are apart
-#: for less than the second part of this time touch immediately.
-CLOSING, AT_ONCE = 1e-9, 1e-6
 
 
 @dataclass(frozen=True)
@@ -345,7 +342,7 @@ def solve_pair(scene: Scene, state: State, middle: float, last: float, *, has_ro
     fine, coarse, number = state.fine, state.twice or state.fine, state.segment
     is_soft = scene.memory.grows(last - fine.time, SOFT)
     needs_pressure = has_row and is_soft
-    solver_part = MAGNIFIED if needs_pressure else SOLVER_PART
+    solver_part = END_STEP if needs_pressure else SOLVER_PART
     first = take_step(scene, fine, middle, number, solver_part=solver_part)
     second = take_step(scene, first, last, number, solver_part=solver_part)
     once = take_step(scene, coarse, last, number, guess=with_difference(second, coarse, fine), solver_part=solver_part)
@@ -437,7 +434,7 @@ def row_inside(scene: Scene, pair: Pair, time: float, number: int) -> Point:
     weight = (time - start.time) / (end.time - start.time)
     pressure = (1 - weight) * start.pressure + weight * end.pressure
     unit = (1 - weight) * start.history.fields[0] + weight * end.history.fields[0]
-    solver_part = MAGNIFIED if pair.is_soft else SOLVER_PART
+    solver_part = END_STEP if pair.is_soft else SOLVER_PART
     row = take_step(scene, start, time, number, guess=(pressure, unit), solver_part=solver_part)
     return with_final_pressure(scene, start, row, number) if pair.is_soft else row
 
@@ -538,7 +535,7 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     if count == 1 and not memory.is_elastic:  # the coarse solution takes the same step: both solver_part its error
         former = state.difference.pressure
         if cells == 1:
-            former = OF_ONE_CELL * float(abs(last.pressure - moved(fine.pressure, 1)).sum()) * grid.cell_area
+            former = UNBOUNDED * float(abs(last.pressure - moved(fine.pressure, 1)).sum()) * grid.cell_area
         shared = max(former - error.pressure, 0.0)
         error = replace(error.or_larger(state.difference), pressure=error.pressure)
     if cells == 1 and not memory.is_elastic:  # there is no solution with longer steps
@@ -684,10 +681,10 @@ def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> 
         first = last_open(left, middle)
         return last_open(middle, right) if first is None else first
 
-    shortest = max(CLOSING * (event - now), math.ulp(event))
+    shortest = max(ROUNDED * (event - now), math.ulp(event))
     turns = [began + time for time in segment.turns(now - began, event - began)]
     for left, right in pairwise((now, *turns, event)):  # the approach is monotone, and the surface only rises
         closes = last_open(left, right)
         if closes is not None:
-            return closes if closes - now > AT_ONCE * (event - now) else now
+            return closes if closes - now > SHORTEST_PAIR * (event - now) else now
     return event
