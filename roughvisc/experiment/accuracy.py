@@ -93,17 +93,13 @@ def memory_of(body: Body, program: Program, settings: Settings, **options: Any) 
     return choose_memory(body, program.duration, settings.tolerance, shortest, **options)
 
 
-def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[float, float]) -> dict[str, float]:
+def error_columns(step: Step, scene: Scene) -> dict[str, float]:
     """Return the stated errors of a step.
 
     Parameters
     ----------
     step, scene : Step, Scene
         An accepted step.
-    series_error : float
-        Relative error of the series that represents the material, from its shortest known age on.
-    largest : tuple of float
-        Largest force [N] and approach [m] of the kept rows so far, to which errors are relative.
 
     Returns
     -------
@@ -115,13 +111,15 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
     -----
     The stated error is the sum of the errors of the time steps, of the contact solver in this and earlier steps, and
     of the series. Under a given load the solver's error of the approach is the duality gap over the load, which is of
-    second order in the error of the pressure. The errors of the series and of the work are relative to the largest
+    second order in the error of the pressure. Errors of pressure, force and approach are relative to the largest
+    values of the kept rows so far and of the step. Errors of the series and of the work are relative to the largest
     values of all steps: values left after unloading are differences of large values. Errors of the work add up.
     """
-    point, state, apart = step.point, step.state, step.difference
+    point, state, error = step.point, step.state, step.difference
     control = scene.program.segments[step.segment].control
     given, remembers = scene.program.prescribes[step.segment], not scene.memory.is_elastic
-    largest_force, largest_approach = largest
+    largest_force, largest_approach = max(state.kept_force, point.force), max(state.kept_approach, abs(point.approach))
+    series_error = scene.memory.series_error  # from the shortest known age on
     loaded = max(state.largest_force, point.force, 1e-300)
     reached = max(state.largest_approach, abs(point.approach), 1e-300)
     age = point.time - scene.program.corners[step.segment]
@@ -130,22 +128,24 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
         part = 1.0 if age < scene.memory.shortest else min(abs(change), 1.0)
         series_error += part * scene.memory.error_of_young(age)
     of_force = series_error * loaded
-    unit = scene.tolerance if largest_force > 0 else 0.0
-    solved = point.solver_error + INHERITED * state.solver_error if remembers else max(point.solver_error, LEAST * unit)
-    work = abs(state.work_apart) + state.work_curved + state.work_relaxed
+    if remembers:
+        solved = point.solver_error + INHERITED * state.solver_error
+    else:
+        solved = max(point.solver_error, LEAST * scene.tolerance * (largest_force > 0))
+    work = abs(state.work_difference) + state.work_curved + state.work_relaxed
     of_work = OF_WORK_OF_STEPS if remembers else OF_WORK["load" if control == "load" else "approach"]
     work += (of_work * solved + series_error) * loaded * reached
     force = approach = 0.0
     if control == "approach" or not given:
-        force = apart.force + solved * point.force + of_force
+        force = error.force + solved * point.force + of_force
     if control == "load" or not given:
-        approach = apart.approach + point.solver_error_approach + series_error * reached
+        approach = error.approach + point.solver_error_approach + series_error * reached
         approach += INHERITED_APPROACH * state.solver_error * reached if remembers else 0.0
-    stepped = apart.pressure + apart.shared
+    stepped = error.pressure + error.shared
     pressure = (stepped + solved * point.force + of_force) / largest_force if largest_force > 0 else solved
     per_force, per_approach = largest_force or math.inf, largest_approach or math.inf
     return {
-        "time_error": max(stepped / per_force, apart.force / per_force, apart.approach / per_approach),
+        "time_error": max(stepped / per_force, error.force / per_force, error.approach / per_approach),
         "stated_error": max(pressure, force / per_force, approach / per_approach),
         "residual": point.solver_error,
         "force_error": force,

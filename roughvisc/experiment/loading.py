@@ -70,8 +70,6 @@ class LoadingState:
     ----------
     march : State or None
         State of the time stepping; None at the start.
-    largest : tuple of float
-        Largest force [N] and approach [m] of the kept rows.
     enlarged, outgrown : int
         Number of times that the surface of an indenter was enlarged, and that contact outgrew the domain.
     border : float or None
@@ -79,7 +77,6 @@ class LoadingState:
     """
 
     march: State | None = None
-    largest: tuple[float, float] = (0.0, 0.0)
     enlarged: int = 0
     outgrown: int = 0
     border: float | None = None
@@ -215,33 +212,33 @@ class LoadingRows(Rows):
         EdgeContactError
             If contact reaches the border of another free surface, unless the settings accept it.
         """
-        scene, largest, domain = self.scene, self.state.largest, self.domain
+        scene, domain = self.scene, self.domain
         every, ends, is_free = scene.kept is None, set(scene.program.corners), scene.grid.boundary == "free"
         for step in march(scene, self.state.march):
             point = step.point
-            if is_free and point.force > 0:
-                touches = point.pressure > 0
+            if is_free and not point.is_open:
+                touches = point.contact
                 at_border = bool(touches[[0, -1]].any() or touches[:, [0, -1]].any())
                 if (at_border and not domain.is_whole) or BEYOND * point.approach >= domain.outside:
                     raise Outgrown(LoadingState(enlarged=self.state.enlarged, outgrown=self.state.outgrown + 1))
                 if at_border:
                     self._reach_border(point.time)
 
-            so_far = max(largest[0], point.force), max(largest[1], abs(point.approach))
-            stated = error_columns(step, scene, scene.memory.series_error, so_far)
+            stated = error_columns(step, scene)
             kept = scene.keeps(point.time)
             if every:  # the length of fixed steps and of steps in a slide cannot be reduced
                 is_given = scene.time_step is not None or scene.program.segments[step.segment].slide is not None
                 kept = point.time in ends or is_given or stated["stated_error"] <= CHOSEN * scene.tolerance
-            largest = so_far if kept else largest
             values: dict[str, Any] = {}
             fields: dict[str, Array] = {}
             if step.is_end:
-                self.state = replace(self.state, march=step.state, largest=largest)
+                self.state = replace(self.state, march=step.state)
             # If hardly any compliance is instantaneous, the pressure of a step that is not kept belongs to the step and
             # not to its end. A prescribed load is correct even then.
             by_load = scene.program.segments[step.segment].control == "load"
-            length = max(point.time - (point.before[0] if point.before else scene.program.corners[step.segment]), 0.0)
+            length = max(
+                point.time - (point.previous[0] if point.previous else scene.program.corners[step.segment]), 0.0
+            )
             if kept or (not every and (by_load or not scene.memory.grows(length, SOFT))):
                 values, fields = self._row(step, length, stated, kept)
             yield Row(point.time, values, fields, kept, self.state if step.is_end else None, point.time)
@@ -280,7 +277,7 @@ class LoadingRows(Rows):
         scene, profile, domain, point = self.scene, self.profile, self.domain, step.point
         grid, present, is_whole, xp = scene.grid, scene.present, domain.is_whole, scene.grid.xp
         displaced, pressure = scene.memory.displacement(point.history), point.pressure
-        contact, displacement = pressure > 0, displaced[0]
+        contact, displacement = point.contact, displaced[0]
         gap = xp.maximum(scene.gap + displacement - point.approach, 0.0)
         gap[contact] = 0.0
 
@@ -291,7 +288,7 @@ class LoadingRows(Rows):
         counted, area, _ = contact_area(contact, free, grid.cell_area, grid.boundary, goes_on)
 
         is_full = is_whole and not bool(free.any())
-        status = "open" if point.force == 0 else "full_contact" if is_full else "converged"
+        status = "open" if point.is_open else "full_contact" if is_full else "converged"
         if is_whole:
             mean_gap = float(gap[scene.solid].mean())
         else:

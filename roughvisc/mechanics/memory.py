@@ -172,7 +172,8 @@ class Memory:
         """Return the elastic problem of a step. [s]"""
         if rule is None:
             follows = history.earlier is not None and step <= LARGEST_GROWTH * history.step
-            rings = self.may_ring and self.grows(step, STIFF)
+            longest = step if history.earlier is None else max(step, history.step)
+            rings = self.may_ring and self.grows(longest, STIFF)
             rule = ("bdf2" if follows else "constant") if rings else "linear"
         own, earlier, before, new = self.recursion(step, history.step, rule)
         xp = namespace(history.modes)

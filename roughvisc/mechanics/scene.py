@@ -175,7 +175,7 @@ class Point:
         Normal force and approach. [N, m]
     history : History
         Memory of the body.
-    before : tuple or None
+    previous : tuple or None
         Time, stored pressure, and displacement per unit compliance of the last point: the next step extrapolates them.
     start : float
         Force [N] or approach [m] at the start of the segment, if the program does not state it.
@@ -190,7 +190,7 @@ class Point:
     force: float
     approach: float
     history: History
-    before: tuple[float, Array | Packed, Array | None] | None = None
+    previous: tuple[float, Array | Packed, Array | None] | None = None
     start: float = 0.0
     is_late: bool = False
     solver_error: float = 0.0

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from roughvisc.mechanics.grid import fft_of
-from roughvisc.mechanics.memory import STIFF, LayerMemory
+from roughvisc.mechanics.memory import STIFF, LayerMemory, Memory
 from roughvisc.mechanics.program import Slide
 from roughvisc.mechanics.scene import SOFT, Point, Scene
 from roughvisc.mechanics.tangential import tangential_force
@@ -40,11 +40,10 @@ ENTERED = 0.3
 SHARED = 0.1
 #: Pressure of a cell that may have entered the contact of a soft body, over the mean pressure.
 ENTERING = 2.5
-#: Error of the pressure after a slide by one cell, which has no coarse solution, as a part of the change of pressure.
-OF_ONE_CELL = 0.25
-#: Error of the work if the force is taken as linear over the approach and vanishes at one end, as a part of this work.
-#: On a sphere it is a fifth, on a cone a third.
-STRAIGHT = 0.25
+#: Error of a quantity that has no second solution, as a part of it. The change of the pressure in a slide by one cell,
+#: and the work of a force that is taken as linear over the approach and vanishes at one end: on a sphere the error is a
+#: fifth of it, on a cone a third.
+UNBOUNDED = 0.25
 #: Force and approach are parabolas over a pair only if each of its steps covers at least this part of it.
 LEAST_PART = 0.1
 
@@ -75,25 +74,30 @@ class Difference:
     friction: float = 0.0
     shared: float = 0.0
 
-    def at_least(self, before: Difference, left: float, left_of_friction: float = 0.0) -> Difference:
-        """Return the errors, each at least a part of the error before a pair.
+    def at_least(
+        self, former: Difference, left: float, left_of_friction: float = 0.0, *, is_soft: bool = False
+    ) -> Difference:
+        """Return the errors, each at least a part of the error before a pair; both shared errors add up.
 
         Parameters
         ----------
-        before : Difference
+        former : Difference
             Errors before the pair.
         left : float
             Part of an error of the pressure that relaxation leaves until the end of the pair.
         left_of_friction : float
             Part of the friction force that is left, see :func:`left_of_friction`.
+        is_soft : bool
+            Whether hardly any of the compliance is instantaneous: only the shared error fades then.
         """
-        part = LASTING * left
+        part = LASTING if is_soft else LASTING * left
         return replace(
             self,
-            pressure=max(self.pressure, part * before.pressure),
-            force=max(self.force, part * before.force),
-            approach=max(self.approach, LASTING * before.approach),
-            friction=max(self.friction, max(left, left_of_friction) * before.friction),  # both may share all of it
+            pressure=max(self.pressure, part * former.pressure),
+            force=max(self.force, part * former.force),
+            approach=max(self.approach, LASTING * former.approach),
+            friction=max(self.friction, max(left, left_of_friction) * former.friction),  # both may share all of it
+            shared=self.shared + left * former.shared,
         )
 
     def or_larger(self, other: Difference, part: float = 1.0) -> Difference:
@@ -129,29 +133,29 @@ def difference(
         return Difference()
     grid, (stated, of_approach) = scene.grid, stated_parts(scene)
     pressure, other = fine.pressure, coarse.pressure
-    apart = Difference(
+    error = Difference(
         pressure=stated * (float(abs(pressure - other).sum()) * grid.cell_area),
         force=stated * abs(fine.force - coarse.force),
         approach=of_approach * abs(fine.approach - coarse.approach),
     )
     if slide is not None:
         of_friction = abs(friction(scene, fine, slide) - friction(scene, coarse, slide))
-        apart = replace(apart, friction=of_friction)
+        error = replace(error, friction=of_friction)
     if not is_kept or (fine.is_open and coarse.is_open):
-        return apart
+        return error
     gap = scene.gap + scene.memory.displacement(fine.history)[0] - fine.approach
     gap_of_coarse = scene.gap + scene.memory.displacement(coarse.history)[0] - coarse.approach
-    contact = pressure > 0
+    contact = fine.contact
     inside = contact & (pressure <= abs(pressure - other))
-    outside = ~contact & ((other > 0) | (gap <= abs(gap - gap_of_coarse)))
+    outside = ~contact & (coarse.contact | (gap <= abs(gap - gap_of_coarse)))
     if scene.present is not None:
         outside &= scene.present
     cells, uncertain = int(contact.sum()), 0.0
     if cells and scene.memory.grows(fine.time - before.time, SOFT):
         uncertain = entering(scene, before, fine) + ENTERING * float(outside.sum()) * fine.force / cells
     return replace(
-        apart,
-        pressure=apart.pressure + uncertain,
+        error,
+        pressure=error.pressure + uncertain,
         inside=grid.cell_area * float(inside.sum()),
         outside=grid.cell_area * float(outside.sum()),
     )
@@ -172,7 +176,7 @@ def entered_early(scene: Scene, before: Point, after: Point) -> float:
 
 def force_of_entered(scene: Scene, before: Point, after: Point) -> float:
     """Return the force on the cells that have entered between two points. [N]"""
-    return float(after.pressure[before.pressure == 0].sum()) * scene.grid.cell_area
+    return float(after.pressure[~before.contact].sum()) * scene.grid.cell_area
 
 
 # ---------------------------------------------------------------------------------------------------------- friction
@@ -278,20 +282,20 @@ def work_of_pair(
     straight = np.cumsum([work_of_step(scene, start, first), work_of_step(scene, first, end)]).tolist()
     begin = np.array([first.force if start.is_late else start.force, touch(scene, start)])
     changes = np.array([[point.force, touch(scene, point)] for point in (first, end)]) - begin
-    is_over_time = end.force > 0
+    is_over_time = not end.is_open
 
     def parameter(point: Point) -> float:
         return point.time - start.time if is_over_time else touch(scene, point) - float(begin[1])
 
     early, last = parameter(first), parameter(end)
-    is_curved = first.force > 0 and LEAST_PART * last**2 < early * last < (1 - LEAST_PART) * last**2
+    is_curved = not first.is_open and LEAST_PART * last**2 < early * last < (1 - LEAST_PART) * last**2
     if is_curved:
         bends = (changes[1] / last - changes[0] / early) / (last - early)
         slopes = changes[0] / early - bends * early
         is_curved = is_over_time or float(slopes[0] * (slopes[0] + 2 * bends[0] * last)) > 0
     if not is_curved:
         forces = [float(begin[0]), first.force, end.force]
-        uncertain = STRAIGHT * (1 - min(forces) / max(*forces, 1e-300))
+        uncertain = UNBOUNDED * (1 - min(forces) / max(*forces, 1e-300))
         path = [start, *points]
         works = np.cumsum([work_of_step(scene, *ends) for ends in zip(path, points, strict=False)]).tolist()
         return works, uncertain * abs(straight[0]), uncertain * abs(straight[1])
@@ -315,11 +319,15 @@ def work_of_pair(
 def transient_error(scene: Scene, start: Point, first: Point, end: Point, *, by_load: bool) -> float:
     """Return the error of the work of a pair after a corner, due to a transient that is over within a step. [J]
 
-    At a corner the rate of the prescribed quantity changes. A force that relaxes within the first step then has an
-    error of the size of the relaxed part ``1 - h R(h) / S(h)`` of its change, with the relaxation function ``R`` and
-    its integral ``S``, twice as much if the rate changes its sign. It remains to the end of the pair. Under a given
-    load the approach is right at both points, and follows the integral of the compliance, ``S``, between them. ``begin
-    + a t + b S(t)`` through the three points of a pair has another integral than the parabola.
+    At a corner the rate of the prescribed quantity changes. A given approach then adds to the force a part that follows
+    ``S(t)``, the integral of the relaxation function. With a pressure that is linear within the step, this part is
+    ``h^2 / I(h)`` after the first step instead, with the integral ``I`` of the compliance. The work has the integral of
+    a parabola in place of the integral of ``S``. Both errors count twice, because the rate may change its sign. If the
+    compliance grows much within the step, the error may be as large as the part ``1 - h R(h) / S(h)`` of the force that
+    relaxes in it, with the relaxation function ``R``. It remains to the end of the pair.
+
+    Under a given load the approach is right at both points, and follows ``I`` between them. ``begin + a t + b I(t)``
+    through the three points of a pair has another integral than the parabola.
 
     Parameters
     ----------
@@ -333,10 +341,11 @@ def transient_error(scene: Scene, start: Point, first: Point, end: Point, *, by_
     if first.is_open or end.is_open:
         return 0.0
     early, last = first.time - start.time, end.time - start.time
+    memory, is_stiff = scene.memory, scene.memory.may_ring and scene.memory.grows(early, STIFF)
     if not by_load:
-        relaxed = 1 - early * scene.memory.relaxation(early) / float(scene.memory.relaxed(early)[0])
-        return 2 * relaxed * abs(first.force - start.force) * abs(end.approach - touch(scene, start))
-    integral, twice = scene.memory.crept([early, last])
+        part = part_relaxed(memory, early) if is_stiff else part_missed(memory, early, last)
+        return 2 * part * abs(first.force - start.force) * abs(end.approach - touch(scene, start))
+    integral, twice = memory.crept([early, last])
     determinant = early * integral[1] - last * integral[0]
     if abs(determinant) <= 1e-9 * last * abs(integral[1]):
         return 0.0
@@ -348,10 +357,34 @@ def transient_error(scene: Scene, start: Point, first: Point, end: Point, *, by_
     bend = (changes[1] / last - changes[0] / early) / (last - early)
     smooth = (changes[0] / early - bend * early) * last**2 / 2 + bend * last**3 / 3
     error = abs(modal - smooth) / last
-    if scene.memory.may_ring and scene.memory.grows(early, STIFF):  # the first step takes the pressure as constant
+    if is_stiff:  # the first step takes the pressure as constant
         missed = 1 - (integral[1] - integral[0]) / (last - early) * last / integral[1]
         error = max(error, 2 / 3 * abs(missed * changes[1]))  # the weight of the first step in the parabola
     return float(error * abs(end.force - start.force))
+
+
+def part_relaxed(memory: Memory, step: float) -> float:
+    """Return the part of the change of a force under a steady approach that relaxes within a step. [s]"""
+    return 1 - step * memory.relaxation(step) / float(memory.relaxed(step)[0])
+
+
+def part_missed(memory: Memory, early: float, last: float) -> float:
+    """Return the error of a force under a steady approach, and of its integral, as a part of its change.
+
+    Parameters
+    ----------
+    memory : Memory
+        Memory of the body.
+    early, last : float
+        Time from the corner to the end of the first step, and of the second. [s]
+    """
+    if not memory.relaxing.any():  # no relaxation function is known
+        return 0.0
+    integral, twice = memory.relaxed([early, last])
+    of_force = abs(1 - integral[0] * float(memory.crept(early)[0]) / (memory.glassy * early**2))
+    bend = (integral[1] / last - integral[0] / early) / (last - early)
+    smooth = (integral[0] / early - bend * early) * last**2 / 2 + bend * last**3 / 3
+    return of_force + abs(twice[1] - smooth) / (last * integral[0])
 
 
 def work_of_step(scene: Scene, before: Point, after: Point, slides: bool = False) -> float:

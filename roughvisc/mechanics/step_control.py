@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from roughvisc.mechanics.memory import LARGEST_GROWTH
 from roughvisc.mechanics.program import Segment
 from roughvisc.mechanics.scene import Point, Scene
 from roughvisc.mechanics.stated_error import Difference, stated_parts
 
-#: Length of the first pair after an event, as a part of the segment: contact changes fast after a corner.
+#: Length of the first pair after an event, as a part of the segment: contact changes fast after a corner. Also the
+#: shortest pair that is repeated in halves because it misses the tolerance at a kept time, as a part of the time since
+#: the segment began.
 FIRST_PAIR = 0.005
 #: Growth of the compliance in the first pair after a jump. In a longer pair the pressure would relax far within a step,
 #: and both solutions would share an error of the slow exponentials.
@@ -17,30 +20,26 @@ RESOLVED = 1.5
 #: Part of the tolerance that a pair may add to the error: usually, and for bodies with hardly any instantaneous
 #: compliance. With 0.4, one in eight cases of such bodies has a row beyond the tolerance. With 0.2 a third to a half of
 #: these cases are within it, for 1.1 times the convolutions; with 0.1 three in five, for 1.26 times.
-SHARE, SHARE_SOFT = 0.3, 0.2
+ALLOWED, ALLOWED_SOFT = 0.25, 0.17
 #: Order of the error of a pair in its length, observed: cells enter and leave the contact within steps.
 ORDER = 1.5
-#: Safety factor of the length of the next pair.
-PLANNED = 0.9
-#: Ratio of the lengths of successive pairs: smallest, largest, and largest if the memory uses BDF2, which is unstable
-#: on steps that grow faster.
-SHRINK, GROW, GROW_STIFF = 0.3, 3.5, 2.3
+#: Ratio of the lengths of successive pairs: smallest and largest. If the memory uses BDF2, a pair that ends later
+#: than planned must not grow by more than LARGEST_GROWTH.
+SHRINK, GROW = 0.3, 3.5
 #: Least part of an error that counts as remaining after relaxation, because other errors do not fade.
 LEAST_REMAINING = 0.02
-#: A pair is rejected if the error that it adds exceeds the allowed error by the first factor. Shorter steps are tried.
-#: If they leave more than the second part of its error, the shorter pair is accepted: a cell that enters the contact
-#: makes the pressure jump, however short the pair is.
-REJECTED, REDUCED = 2.0, 0.93
-#: Shortest pair that is repeated in halves because it misses the tolerance at a kept time, as a part of the time since
-#: the segment began.
-LANDING_PAIR = 0.01
-#: Shortest pair, as a part of the segment, or of the time from its start to its first kept time.
+#: A pair is rejected if the error that it adds exceeds the allowed error by this factor, and shorter steps are tried.
+#: If they do not reduce its error, the shorter pair is accepted: a cell that enters the contact makes the pressure
+#: jump, however short the pair is.
+REJECTED = 2.3
+#: Shortest pair, as a part of the segment, or of the time from its start to its first kept time. Surfaces that are open
+#: for less than this part of the time to the next event touch immediately.
 SHORTEST_PAIR = 1e-6
 #: Least number of pairs in a period of a cycle.
 PAIRS_OF_A_CYCLE = 8
 #: A pair ends at a kept time, or at the end of its segment, that lies within this part of its length around its end.
 SLACK = 0.2
-#: Times that differ by less than this part of a pair or a period are equal.
+#: Times that differ by less than this part of a pair, a period, or the time to the next event are equal.
 ROUNDED = 1e-9
 #: Rounding of displacements, relative to the largest displacement that the mean pressure could cause.
 ROUNDING = 1e-11
@@ -52,7 +51,7 @@ class Pair:
 
     Attributes
     ----------
-    before, coarse_before : Point
+    start, coarse_start : Point
         Both solutions before the pair.
     first, second : Point
         Fine solution after each step.
@@ -62,8 +61,8 @@ class Pair:
         Whether hardly any of the compliance of the pair is instantaneous.
     """
 
-    before: Point
-    coarse_before: Point
+    start: Point
+    coarse_start: Point
     first: Point
     second: Point
     once: Point
@@ -72,11 +71,11 @@ class Pair:
     @property
     def length(self) -> float:
         """Length of the pair. [s]"""
-        return self.second.time - self.before.time
+        return self.second.time - self.start.time
 
     def receding(self) -> bool:
         """Return whether cells have left the contact."""
-        return bool((self.before.contact & ~self.second.contact).any())
+        return bool((self.start.contact & ~self.second.contact).any())
 
 
 @dataclass(frozen=True)
@@ -115,9 +114,9 @@ class Controller:
         is_stiff : bool
             Whether the memory uses BDF2 in the next pair.
         """
-        factor = PLANNED * max(ratio, 1e-300) ** (-1 / ORDER)
-        is_too_long = REJECTED < ratio < REDUCED * self.refused
-        misses = 1 < at_row < 0.9 * self.refused_at_row
+        factor = max(ratio, 1e-300) ** (-1 / ORDER)
+        is_too_long = REJECTED < ratio < self.refused
+        misses = 1 < at_row < self.refused_at_row
         if taken > self.shortest:
             if opens:
                 return self, SHRINK * taken
@@ -125,7 +124,8 @@ class Controller:
                 return replace(self, refused=ratio), taken * max(factor, SHRINK)
             if misses:
                 return replace(self, refused=ratio, refused_at_row=at_row), 0.5 * taken
-        return None, taken * min(max(factor, SHRINK), GROW_STIFF if is_stiff else GROW)
+        largest = LARGEST_GROWTH / (1 + SLACK) if is_stiff else GROW
+        return None, taken * min(max(factor, SHRINK), largest)
 
 
 def first_length(scene: Scene, segment: Segment, jumped: bool) -> float:
@@ -172,7 +172,14 @@ def pair_ends(scene: Scene, number: int, now: float, length: float, *, is_first:
 
 
 def errors_over_allowed(
-    scene: Scene, pair: Pair, number: int, error: Difference, shared: float, kept: tuple[float, float], *, lands: bool
+    scene: Scene,
+    pair: Pair,
+    number: int,
+    error: Difference,
+    shared: float,
+    largest: tuple[float, float],
+    *,
+    lands: bool,
 ) -> tuple[float, float]:
     """Return the error that a pair adds at the next kept time, and its error at a kept row, over the allowed errors.
 
@@ -191,26 +198,26 @@ def errors_over_allowed(
         Stated error at the end of the pair.
     shared : float
         Error of the pressure that both solutions share. [N]
-    kept : tuple of float
+    largest : tuple of float
         Largest force and approach of the kept rows so far; a given approach is the largest of all steps. [N, m]
     lands : bool
         Whether the pair contains a kept row.
     """
     second, taken, memory = pair.second, pair.length, scene.memory
-    force = max(kept[0], pair.first.force, second.force, 1e-300)
+    force = max(largest[0], pair.first.force, second.force, 1e-300)
     rounding = ROUNDING * memory.compliance(second.time) * scene.grid.largest_eigenvalue * force / scene.gap.size
-    approach = max(kept[1], abs(pair.first.approach), abs(second.approach), rounding / scene.grid.cell_area, 1e-300)
+    approach = max(largest[1], abs(pair.first.approach), abs(second.approach), rounding / scene.grid.cell_area, 1e-300)
 
     row, (stated, of_approach) = 0.0, stated_parts(scene)
-    if lands and scene.keeps(second.time) and taken > LANDING_PAIR * (second.time - scene.program.corners[number]):
+    if lands and scene.keeps(second.time) and taken > FIRST_PAIR * (second.time - scene.program.corners[number]):
         of_pressure = max(error.pressure / stated, error.pressure + shared) / force
         row = max(of_pressure, error.approach / of_approach / approach) / scene.tolerance
 
     following = second.time if lands else min(scene.next_kept(second.time), scene.program.duration)
     ahead = growth_until(scene, number, second, following)
     scales = max(force, second.force * ahead), max(approach, abs(second.approach) * ahead**0.5)
-    share = SHARE_SOFT if scene.is_soft else SHARE
-    return added(scene, pair, number, following, scales) / (share * scene.tolerance), row
+    part = ALLOWED_SOFT if scene.is_soft else ALLOWED
+    return added(scene, pair, number, following, scales) / (part * scene.tolerance), row
 
 
 def growth_until(scene: Scene, number: int, point: Point, following: float) -> float:
@@ -239,21 +246,21 @@ def added(scene: Scene, pair: Pair, number: int, following: float, scales: tuple
     memory, second, once, taken = scene.memory, pair.second, pair.once, pair.length
     is_soft, by_load = pair.is_soft, scene.program.segments[number].control == "load"
     receding = pair.receding()
-    after = second.pressure - once.pressure
-    before = pair.before.pressure - pair.coarse_before.pressure
-    change = float(abs(after - before).sum())
+    at_end = second.pressure - once.pressure
+    at_start = pair.start.pressure - pair.coarse_start.pressure
+    change = float(abs(at_end - at_start).sum())
     if is_soft:
         remains = memory.compliance(taken) / memory.compliance(following - second.time + taken)
         remains = 1.0 if receding else remains
     else:
-        change = min(change, float(abs(after - memory.remaining(taken) * before).sum()))
+        change = min(change, float(abs(at_end - memory.remaining(taken) * at_start).sum()))
         remains = max(memory.remaining(following - second.time), LEAST_REMAINING)
-    largest = change * scene.grid.cell_area / scales[0] * remains
+    error = change * scene.grid.cell_area / scales[0] * remains
     if by_load:
-        of_approach = (second.approach - once.approach) - (pair.before.approach - pair.coarse_before.approach)
-        largest = max(largest, abs(of_approach) / scales[1])
+        of_approach = (second.approach - once.approach) - (pair.start.approach - pair.coarse_start.approach)
+        error = max(error, abs(of_approach) / scales[1])
     if not by_load or second.is_open or is_soft:
         surface = memory.displacement(second.history)[0] - memory.displacement(once.history)[0]
-        surface -= memory.displacement(pair.before.history)[0] - memory.displacement(pair.coarse_before.history)[0]
-        largest = max(largest, float(abs(surface).max()) / scales[1] * (1.0 if is_soft or receding else remains))
-    return largest
+        surface -= memory.displacement(pair.start.history)[0] - memory.displacement(pair.coarse_start.history)[0]
+        error = max(error, float(abs(surface).max()) / scales[1] * (1.0 if is_soft or receding else remains))
+    return error

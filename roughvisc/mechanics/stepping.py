@@ -29,7 +29,7 @@ from roughvisc.mechanics.program import Segment, Slide, instant
 from roughvisc.mechanics.scene import SOFT, Array, Packed, Point, Scene
 from roughvisc.mechanics.stated_error import (
     LASTING,
-    OF_ONE_CELL,
+    UNBOUNDED,
     Difference,
     difference,
     entered_early,
@@ -47,6 +47,7 @@ from roughvisc.mechanics.step_control import (
     GROW,
     PAIRS_OF_A_CYCLE,
     ROUNDED,
+    SHORTEST_PAIR,
     Controller,
     Pair,
     errors_over_allowed,
@@ -63,15 +64,11 @@ Guess = tuple[Array, Array | None]
 PACKED_FROM = 1024**2
 #: Tolerance of the contact solver over the tolerance of the run: usually, and in a slide. A step of a slow slide
 #: changes the pressure little, and the friction force is a small part of the load.
-SOLVER_SHARE, SLIDING_SHARE = 0.2, 0.06
-#: Length of the additional step that gives the pressure at the end of a soft step, as a part of the soft step.
+SOLVER_PART, SLIDING_PART = 0.2, 0.06
+#: Length of the additional step that gives the pressure at the end of a soft step, as a part of the soft step. Also
+#: the tolerance of the contact solver in the soft step over the tolerance of the run: the additional step magnifies the
+#: residual.
 END_STEP = 1e-3
-#: Tolerance of the contact solver over the tolerance of the run in a soft step with a kept row: the additional step
-#: magnifies the residual.
-MAGNIFIED = 6e-4
-#: Error of the time at which an open contact closes, as a part of the time to the next event. Surfaces that are apart
-#: for less than the second part of this time touch immediately.
-CLOSING, AT_ONCE = 1e-9, 1e-6
 
 
 @dataclass(frozen=True)
@@ -86,7 +83,7 @@ class State:
         Solution with steps twice as long, at the same instant; None while both solutions are equal.
     segment : int
         Index of the segment of the program.
-    length : float
+    next_length : float
         Length of the next pair; zero after an event. [s]
     difference : Difference
         Stated error of the time steps.
@@ -98,7 +95,7 @@ class State:
         Largest relative error of the pressure due to the contact solver so far.
     work : float
         Work of the normal force since the start. [J]
-    work_apart : float
+    work_difference : float
         Work of the coarse solution less the work of the fine one, both along straight paths. [J]
     work_curved : float
         Error of the quadrature of the work: root of the sum of the squares of all pairs. [J]
@@ -113,7 +110,7 @@ class State:
     fine: Point
     twice: Point | None = None
     segment: int = 0
-    length: float = 0.0
+    next_length: float = 0.0
     difference: Difference = Difference()
     largest_force: float = 0.0
     largest_approach: float = 0.0
@@ -121,7 +118,7 @@ class State:
     kept_approach: float = 0.0
     solver_error: float = 0.0
     work: float = 0.0
-    work_apart: float = 0.0
+    work_difference: float = 0.0
     work_curved: float = 0.0
     work_relaxed: float = 0.0
     distance: float = 0.0
@@ -183,6 +180,7 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
         approach = 0.0 if given else float(scene.gap[scene.solid].min())
         state = State(Point(0.0, nothing, 0.0, approach, scene.memory.start(nothing)))
         if segments and segments[0].duration > 0:
+            state = replace(state, kept_approach=abs(approach) if scene.keeps(0.0) else 0.0)
             yield Step(state.fine, state.difference, 0, state)
     scene.grid.convolutions = state.convolutions
     while state.segment < len(segments):
@@ -201,17 +199,31 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
         comes_again = jumps_next and (scene.can_jump or is_jump)
         if comes_again or (is_jump and not (scene.can_jump or is_start)):
             steps.pop()
-        rows = [step.point for step in steps if scene.keeps(step.point.time)]
-        state = replace(
-            state,
-            kept_force=max([state.kept_force, *(row.force for row in rows)]),
-            kept_approach=max([state.kept_approach, *(abs(row.approach) for row in rows)]),
-        )
-        del rows  # frees their memory while the next steps are computed
-        if steps and steps[-1].is_end:
-            steps[-1] = steps[-1]._replace(state=state)
+        steps = with_largest_kept(scene, state, steps)
+        if steps:
+            last = steps[-1].state
+            state = replace(state, kept_force=last.kept_force, kept_approach=last.kept_approach)
+            del last
         yield from steps
         steps = []  # frees their memory while the next steps are computed
+
+
+def with_largest_kept(scene: Scene, state: State, steps: list[Step]) -> list[Step]:
+    """Return steps whose states have the largest force and approach of the kept rows so far, each step included.
+
+    Parameters
+    ----------
+    scene, state : Scene, State
+        Input, and a state with the largest values before the steps.
+    steps : list of Step
+        Accepted steps, in order.
+    """
+    force, approach, counted = state.kept_force, state.kept_approach, list[Step]()
+    for step in steps:
+        if scene.keeps(step.point.time):
+            force, approach = max(force, step.point.force), max(approach, abs(step.point.approach))
+        counted.append(step._replace(state=replace(step.state, kept_force=force, kept_approach=approach)))
+    return counted
 
 
 # ---------------------------------------------------------------------------------------------------------- segments
@@ -239,13 +251,13 @@ def next_segment(scene: Scene, state: State) -> State:
         start = point.approach if following.control == "approach" else load if jumped else point.force
         is_late = jumped or (corner.is_abrupt and not point.is_open)
         points.append(replace(without_past(point), start=start, is_late=is_late))
-    length = state.length if corner.is_smooth and not fine.is_open else 0.0
-    return replace(state, fine=points[0], twice=points[1] if state.twice else None, segment=index, length=length)
+    length = state.next_length if corner.is_smooth and not fine.is_open else 0.0
+    return replace(state, fine=points[0], twice=points[1] if state.twice else None, segment=index, next_length=length)
 
 
 def without_past(point: Point) -> Point:
     """Return a point without its past: the next step neither extrapolates nor uses the step before."""
-    return replace(point, before=None, history=replace(point.history, earlier=None, step=0.0))
+    return replace(point, previous=None, history=replace(point.history, earlier=None, step=0.0))
 
 
 def single_step(scene: Scene, state: State, time: float) -> Step:
@@ -257,8 +269,8 @@ def single_step(scene: Scene, state: State, time: float) -> Step:
         other = take_step(scene, coarse, time, number, guess=with_difference(new, coarse, fine), rule=rule)
     error = difference(scene, fine, new, other, scene.motions[number], is_kept=scene.keeps(time))
     left = scene.memory.remaining(time - fine.time)
-    error = error if new.is_open else error.at_least(state.difference, left)
-    error = replace(error, shared=state.difference.shared * left)
+    lasting = error.at_least(state.difference, left)
+    error = replace(error, shared=lasting.shared) if new.is_open else lasting
     reached, twice = new, other
     if new.is_open and fine.is_open and not fine.is_late:
         reached = without_past(new)
@@ -268,7 +280,7 @@ def single_step(scene: Scene, state: State, time: float) -> Step:
     return Step(new, error, number, after)
 
 
-def step_apart(scene: Scene, state: State, closes: float) -> Step:
+def step_while_open(scene: Scene, state: State, closes: float) -> Step:
     """Return a step between open surfaces, to the time at which they touch. [s]
 
     Without instantaneous compliance the force jumps when a surface closes on its former imprint. The time of the jump
@@ -290,7 +302,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
     if fine.is_open and not fine.is_late:
         closes = closing_time(scene, state, segment, event)
         if closes > fine.time:
-            return [step_apart(scene, state, closes)]
+            return [step_while_open(scene, state, closes)]
     if scene.memory.is_elastic:
         longest = (end - began) / 20 if scene.kept is None else math.inf
         parts = max(math.ceil((event - fine.time) / (scene.time_step or longest) * (1 - ROUNDED)), 1)
@@ -298,23 +310,23 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
 
     former = scene.program.segments[number - 1] if number > 0 else segment
     jumped = (former.duration == 0 or former.slide is not None) and not fine.is_open
-    length = state.length or first_length(scene, segment, jumped)
+    length = state.next_length or first_length(scene, segment, jumped)
     if segment.amplitude:
         length = min(length, segment.period / PAIRS_OF_A_CYCLE)
     controller: Controller | None = Controller(shortest_length(scene, number))
-    kept = state.kept_force, state.kept_approach if segment.control == "load" else state.largest_approach
+    largest = state.kept_force, state.kept_approach if segment.control == "load" else state.largest_approach
     while controller is not None:
-        middle, last = pair_ends(scene, number, fine.time, length, is_first=not state.length)
+        middle, last = pair_ends(scene, number, fine.time, length, is_first=not state.next_length)
         times = (last,) if scene.kept is None else scene.kept_within(fine.time, last)
         pair, at_end, coarse_at_end = solve_pair(scene, state, middle, last, has_row=bool(times))
         slide = scene.motions[number] if times else None
         error = difference(scene, fine, at_end, coarse_at_end, slide, is_kept=bool(times))
-        shared = state.difference.shared * scene.memory.remaining(pair.length)
         if times and not pair.is_soft:  # a pair without a kept row adds nothing to this error
-            shared += entered_early(scene, fine, pair.second)
+            error = replace(error, shared=entered_early(scene, fine, pair.second))
         if scene.time_step is not None:
             break
-        ratio, at_row = errors_over_allowed(scene, pair, number, error, shared, kept, lands=bool(times))
+        shared = error.shared + state.difference.shared * scene.memory.remaining(pair.length)
+        ratio, at_row = errors_over_allowed(scene, pair, number, error, shared, largest, lands=bool(times))
         loses_contact = not fine.is_open and (pair.first.is_open or pair.second.is_open)
         opens = segment.control == "approach" and loses_contact and pair.second.approach >= fine.approach
         is_stiff = scene.memory.grows(GROW * pair.length, STIFF)
@@ -322,7 +334,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         if controller is not None:
             del pair, at_end, coarse_at_end  # frees their memory while the pair is repeated
 
-    return accepted(scene, state, pair, at_end, times, replace(error, shared=shared), length)
+    return accepted(scene, state, pair, at_end, times, error, length)
 
 
 def solve_pair(scene: Scene, state: State, middle: float, last: float, *, has_row: bool) -> tuple[Pair, Point, Point]:
@@ -330,10 +342,10 @@ def solve_pair(scene: Scene, state: State, middle: float, last: float, *, has_ro
     fine, coarse, number = state.fine, state.twice or state.fine, state.segment
     is_soft = scene.memory.grows(last - fine.time, SOFT)
     needs_pressure = has_row and is_soft
-    share = MAGNIFIED if needs_pressure else SOLVER_SHARE
-    first = take_step(scene, fine, middle, number, share=share)
-    second = take_step(scene, first, last, number, share=share)
-    once = take_step(scene, coarse, last, number, guess=with_difference(second, coarse, fine), share=share)
+    solver_part = END_STEP if needs_pressure else SOLVER_PART
+    first = take_step(scene, fine, middle, number, solver_part=solver_part)
+    second = take_step(scene, first, last, number, solver_part=solver_part)
+    once = take_step(scene, coarse, last, number, guess=with_difference(second, coarse, fine), solver_part=solver_part)
     pair = Pair(fine, coarse, first, second, once, is_soft)
     if not needs_pressure:
         return pair, second, once
@@ -341,7 +353,13 @@ def solve_pair(scene: Scene, state: State, middle: float, last: float, *, has_ro
 
 
 def accepted(
-    scene: Scene, state: State, pair: Pair, at_end: Point, times: tuple[float, ...], error: Difference, length: float
+    scene: Scene,
+    state: State,
+    pair: Pair,
+    at_end: Point,
+    times: tuple[float, ...],
+    error: Difference,
+    next_length: float,
 ) -> list[Step]:
     """Return the steps of an accepted pair, with the kept rows inside it and the state after it.
 
@@ -356,13 +374,18 @@ def accepted(
     times : tuple of float
         Kept times of the pair. [s]
     error : Difference
-        Stated error at the end.
-    length : float
+        Error that the pair states at its end.
+    next_length : float
         Length of the next pair. [s]
     """
-    fine, memory, number = pair.before, scene.memory, state.segment
-    relaxed, slide = 1.0 if pair.is_soft else memory.remaining(pair.length), scene.motions[number]
-    error = error.at_least(state.difference, relaxed, left_of_friction(scene, fine, pair.second, slide))
+    fine, memory, number, former = pair.start, scene.memory, state.segment, state.difference
+    slide = scene.motions[number]
+
+    def at_least(error: Difference, point: Point) -> Difference:
+        left = memory.remaining(point.time - fine.time)
+        return error.at_least(former, left, left_of_friction(scene, fine, point, slide), is_soft=pair.is_soft)
+
+    error = at_least(error, pair.second)
 
     inside = [row_at_middle(scene, pair, number) if pair.first.time in times else pair.first]
     for time in times:
@@ -379,26 +402,22 @@ def accepted(
         state,
         [pair.first, pair.second],
         pair.once,
-        length,
+        next_length,
         difference=error,
         work=state.work + works[-1],
         work_curved=math.hypot(state.work_curved, last_error),
         work_relaxed=state.work_relaxed + relaxing,
     )
 
-    steps, apart = [], max(state.work_apart, after.work_apart, key=abs)
+    steps, of_work = [], max(state.work_difference, after.work_difference, key=abs)
     for point, work in zip(inside, works[:-1], strict=True):
         left = 1.0 if pair.is_soft else memory.remaining(point.time - fine.time)
         uncertain = entering(scene, fine, point)
         uncertain = uncertain if pair.is_soft else max(uncertain, entered_early(scene, fine, point))
-        shared = uncertain + state.difference.shared * memory.remaining(point.time - fine.time)
-        between = error.or_larger(state.difference, left).at_least(
-            state.difference, 0.0, left_of_friction(scene, fine, point, slide)
-        )
-        between = replace(between, shared=shared)
+        between = at_least(replace(error.or_larger(former, left), shared=uncertain), point)
         curved = math.hypot(state.work_curved, work_error if point.time <= pair.first.time else last_error)
         within = replace(
-            state, work=state.work + work, work_curved=curved, work_apart=apart, work_relaxed=after.work_relaxed
+            state, work=state.work + work, work_curved=curved, work_difference=of_work, work_relaxed=after.work_relaxed
         )
         steps.append(Step(point, between, number, within, is_end=False))
     return [*steps, Step(at_end, error, number, after)]
@@ -406,17 +425,17 @@ def accepted(
 
 def row_at_middle(scene: Scene, pair: Pair, number: int) -> Point:
     """Return the fine solution after the first step of a pair, with the pressure at that time."""
-    return with_final_pressure(scene, pair.before, pair.first, number) if pair.is_soft else pair.first
+    return with_final_pressure(scene, pair.start, pair.first, number) if pair.is_soft else pair.first
 
 
 def row_inside(scene: Scene, pair: Pair, time: float, number: int) -> Point:
     """Return the solution at a kept time inside a pair [s], one step from the point of the fine solution before it."""
-    start, end = (pair.before, pair.first) if time < pair.first.time else (pair.first, pair.second)
+    start, end = (pair.start, pair.first) if time < pair.first.time else (pair.first, pair.second)
     weight = (time - start.time) / (end.time - start.time)
     pressure = (1 - weight) * start.pressure + weight * end.pressure
     unit = (1 - weight) * start.history.fields[0] + weight * end.history.fields[0]
-    share = MAGNIFIED if pair.is_soft else SOLVER_SHARE
-    row = take_step(scene, start, time, number, guess=(pressure, unit), share=share)
+    solver_part = END_STEP if pair.is_soft else SOLVER_PART
+    row = take_step(scene, start, time, number, guess=(pressure, unit), solver_part=solver_part)
     return with_final_pressure(scene, start, row, number) if pair.is_soft else row
 
 
@@ -431,7 +450,7 @@ def with_final_pressure(scene: Scene, before: Point, point: Point, number: int) 
     if scene.program.segments[number].control == "approach":
         value = 2 * point.approach - scene.program.prescribed(number, point.time - ahead, point.start)
     later = take_step(scene, without_past(point), point.time + ahead, number, value, rule="constant")
-    return replace(later, time=point.time, approach=point.approach, before=point.before)
+    return replace(later, time=point.time, approach=point.approach, previous=point.previous)
 
 
 def after_steps(
@@ -439,7 +458,7 @@ def after_steps(
     state: State,
     points: list[Point],
     coarse: Point,
-    length: float = 0.0,
+    next_length: float = 0.0,
     **totals: Any,
 ) -> State:
     """Return the state after accepted steps; at the end of a segment, the state at the start of the next one.
@@ -452,23 +471,23 @@ def after_steps(
         Fine solution at the end of each step.
     coarse : Point
         Coarse solution at the end of the last step.
-    length : float
+    next_length : float
         Length of the next pair. [s]
     **totals
         Other attributes of the new state: difference, work and its error, distance.
     """
-    fine, apart = points[-1], 0.0
+    fine, of_work = points[-1], 0.0
     if coarse is not fine:
-        apart = work_of_step(scene, state.twice or state.fine, coarse) - work_of_step(scene, state.fine, fine)
+        of_work = work_of_step(scene, state.twice or state.fine, coarse) - work_of_step(scene, state.fine, fine)
     reached = replace(
         state,
         fine=fine,
-        twice=None if coarse is fine else replace(coarse, before=None),  # the coarse solution does not extrapolate
-        length=length,
+        twice=None if coarse is fine else replace(coarse, previous=None),  # the coarse solution does not extrapolate
+        next_length=next_length,
         largest_force=max(state.largest_force, points[0].force, fine.force),
         largest_approach=max(state.largest_approach, abs(points[0].approach), abs(fine.approach)),
         solver_error=max(state.solver_error, *(point.solver_error for point in points), coarse.solver_error),
-        work_apart=state.work_apart + apart,
+        work_difference=state.work_difference + of_work,
         convolutions=scene.grid.convolutions,
         **totals,
     )
@@ -495,10 +514,10 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
 
     def body_under(here: Point, number: int) -> Point:
         history = memory.roll(here.history, slide.sense * number, slide.axis)
-        return replace(here, history=history, stored_pressure=moved(here.pressure, number), before=None)
+        return replace(here, history=history, stored_pressure=moved(here.pressure, number), previous=None)
 
     def over(here: Point, number: int, time: float, guess: Guess) -> Point:
-        return take_step(scene, body_under(here, number), time, state.segment, guess=guess, share=SLIDING_SHARE)
+        return take_step(scene, body_under(here, number), time, state.segment, guess=guess, solver_part=SLIDING_PART)
 
     points, works = [fine], [0.0]
     for number in range(1, count + 1):
@@ -512,16 +531,16 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     is_kept = any(scene.keeps(point.time) for point in points[1:])
     error = difference(scene, fine, last, once, slide, is_kept=is_kept)
     relaxed = memory.remaining(last.time - fine.time)
-    shared = state.difference.shared * relaxed
-    if count == 1 and not memory.is_elastic:  # the coarse solution takes the same step: both share its error
+    shared = 0.0
+    if count == 1 and not memory.is_elastic:  # the coarse solution takes the same step: both solver_part its error
         former = state.difference.pressure
         if cells == 1:
-            former = OF_ONE_CELL * float(abs(last.pressure - moved(fine.pressure, 1)).sum()) * grid.cell_area
-        shared += max(former - error.pressure, 0.0)
+            former = UNBOUNDED * float(abs(last.pressure - moved(fine.pressure, 1)).sum()) * grid.cell_area
+        shared = max(former - error.pressure, 0.0)
         error = replace(error.or_larger(state.difference), pressure=error.pressure)
     if cells == 1 and not memory.is_elastic:  # there is no solution with longer steps
         error = replace(error, friction=abs(friction(scene, last, slide)))
-    error = error.at_least(state.difference, relaxed)
+    error = replace(error, shared=shared).at_least(state.difference, relaxed)
     step, skipped = points[1].time - fine.time, 0.0
     if taken == 0 and not memory.is_elastic:  # a long first step is of first order, and the next one corrects it
         change = abs(friction(scene, points[1], slide) - friction(scene, last, slide))
@@ -529,11 +548,11 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
         skipped = max(skipped, change * (1 - memory.remaining(step)))
     carried = max(LASTING * state.difference.friction, skipped if count == 1 else skipped * memory.remaining(step))
     of_friction = max(error.friction, carried, phase_error(scene, last, slide, step))  # each step makes a new error
-    error = replace(error, shared=shared, friction=of_friction)
+    error = replace(error, friction=of_friction)
     work, distance = state.work + works[-1], state.distance + count * side
     after = after_steps(scene, state, points[1:], once, difference=error, work=work, distance=distance)
-    apart = max(state.work_apart, after.work_apart, key=abs)
-    inside = replace(state, work=state.work + works[1], work_apart=apart, distance=state.distance + side)
+    of_work = max(state.work_difference, after.work_difference, key=abs)
+    inside = replace(state, work=state.work + works[1], work_difference=of_work, distance=state.distance + side)
     ends = Step(last, error, state.segment, after)
     between = error.or_larger(state.difference)
     between = replace(between, friction=max(between.friction, skipped))
@@ -551,7 +570,7 @@ def take_step(
     value: float | None = None,
     guess: Guess | None = None,
     rule: Rule | None = None,
-    share: float = SOLVER_SHARE,
+    solver_part: float = SOLVER_PART,
 ) -> Point:
     """Return the point a step ahead.
 
@@ -571,7 +590,7 @@ def take_step(
         First guess: pressure [Pa], and its displacement per unit compliance [m Pa]. Default: extrapolation.
     rule : {"linear", "bdf2", "constant"}, optional
         Rule of the memory.
-    share : float
+    solver_part : float
         Tolerance of the contact solver over the tolerance of the run.
 
     Raises
@@ -587,15 +606,15 @@ def take_step(
     gap += scene.gap
     lowest = float(gap[scene.solid].min())
     common = here.history.fields[0] if prediction.grid is None else None  # displacement per unit compliance
-    before = (here.time, here.stored_pressure, common) if step > 0 and not here.is_late else None
+    previous = (here.time, here.stored_pressure, common) if step > 0 and not here.is_late else None
     if (value == 0) if by_load else (value <= lowest):
         nothing = grid.xp.zeros(gap.shape)
         history = memory.advance(here.history, prediction, nothing, nothing)
-        return Point(time, nothing, 0.0, lowest if by_load else value, history, before, here.start)
+        return Point(time, nothing, 0.0, lowest if by_load else value, history, previous, here.start)
     pressure, unit = guess or (here.pressure, common)
-    if guess is None and here.before is not None and step > 0:
+    if guess is None and here.previous is not None and step > 0:
         # Extrapolate from the last two points.
-        then, stored, former_unit = here.before
+        then, stored, former_unit = here.previous
         ratio = step / (here.time - then)
         pressure = pressure + ratio * (pressure - replace(here, stored_pressure=stored).pressure)
         unit = None if unit is None or pressure.min() < 0 else unit + ratio * (unit - former_unit)
@@ -606,7 +625,7 @@ def take_step(
         start = {"start": pressure, "start_displacement": unit}
     del pressure, unit
     given: dict[str, Any] = {"load": value * alpha / area} if by_load else {"approach": value}
-    tolerance = max(share * scene.tolerance, 1e-10)
+    tolerance = max(solver_part * scene.tolerance, 1e-10)
     try:
         found = solve_contact(grid, gap, tolerance=tolerance, **start, **given, overwrite=True, present=scene.present)
     except ConvergenceError as error:
@@ -624,7 +643,7 @@ def take_step(
     if pressure.size >= PACKED_FROM and 2 * int((pressure > 0).sum()) < pressure.size:
         cells = grid.xp.flatnonzero(pressure).astype(np.int32)
         stored = Packed(pressure.shape, cells, pressure.reshape(-1)[cells])
-    return Point(time, stored, force, approach, history, before, here.start, False, *errors)
+    return Point(time, stored, force, approach, history, previous, here.start, False, *errors)
 
 
 def with_difference(second: Point, coarse: Point, fine: Point) -> Guess:
@@ -636,8 +655,8 @@ def with_difference(second: Point, coarse: Point, fine: Point) -> Guess:
     unit = second.history.fields[0]
     if coarse is fine:
         return second.pressure, unit
-    apart = coarse.history.fields[0] - fine.history.fields[0]
-    return second.pressure + (coarse.pressure - fine.pressure), unit + apart
+    unit_difference = coarse.history.fields[0] - fine.history.fields[0]
+    return second.pressure + (coarse.pressure - fine.pressure), unit + unit_difference
 
 
 def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> float:
@@ -649,7 +668,7 @@ def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> 
     if segment.highest(here.start) <= float(scene.gap[scene.solid].min()):
         return event
 
-    def last_apart(left: float, right: float) -> float | None:
+    def last_open(left: float, right: float) -> float | None:
         """Return the last time between two times at which the surfaces are still apart; None if they stay apart."""
         surface = scene.gap + scene.memory.after_rest(here.history, right - now)
         level = float(surface[scene.solid].min())
@@ -659,13 +678,13 @@ def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> 
         if right - left <= shortest:
             return left
         middle = 0.5 * (left + right)
-        first = last_apart(left, middle)
-        return last_apart(middle, right) if first is None else first
+        first = last_open(left, middle)
+        return last_open(middle, right) if first is None else first
 
-    shortest = max(CLOSING * (event - now), math.ulp(event))
+    shortest = max(ROUNDED * (event - now), math.ulp(event))
     turns = [began + time for time in segment.turns(now - began, event - began)]
     for left, right in pairwise((now, *turns, event)):  # the approach is monotone, and the surface only rises
-        closes = last_apart(left, right)
+        closes = last_open(left, right)
         if closes is not None:
-            return closes if closes - now > AT_ONCE * (event - now) else now
+            return closes if closes - now > SHORTEST_PAIR * (event - now) else now
     return event

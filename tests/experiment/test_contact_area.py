@@ -38,7 +38,7 @@ def pulled():
     """
     names = ("contact_area", "contact_area_error")
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(stepping, "SOLVER_SHARE", 1e-4)
+        patched.setattr(stepping, "SOLVER_PART", 1e-4)
         runs = {
             step: pressed(MATERIAL, PULLED, times=TIMES, numerics=rv.Numerics(time_step=step))
             for step in (0.1, 0.025, 1 / 80)

@@ -37,7 +37,7 @@ def pressed(surface, material, program, tolerance=TOLERANCE, times=TIMES):
 @pytest.mark.thorough
 def test_time_error__covers_the_true_one_and_not_by_far(monkeypatch):
     """If only the steps leave an error. That of a given approach is zero."""
-    monkeypatch.setattr(stepping, "SOLVER_SHARE", 1e-4)
+    monkeypatch.setattr(stepping, "SOLVER_PART", 1e-4)
     true, stated = [], []
     for material in ("maxwell", "two_branches"):
         for name, program in PROGRAMS.items():
