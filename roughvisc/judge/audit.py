@@ -11,6 +11,7 @@ import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -575,7 +576,8 @@ def audit(
     expect_result(result, *(name for name in ("height", "pressure") if name in result))
     case = None
     if "case" in result.attrs:
-        case = Case.from_json(result.attrs["case"])
+        source = result.encoding.get("source")
+        case = Case.from_json(result.attrs["case"], Path(source).parent if source else None)
         given = {**case.audit_inputs, **given}
     scene, findings = Scene(result, given, case), []
     for name, limit in LIMITS.items():

@@ -73,11 +73,12 @@ def result_folder(case: Case, out: str | Path | None = None) -> Path:
 
 
 def compute(
-    case: Case, keeper: CheckpointWriter, *, progress: bool | Progress = True, threads: int | None = None
+    case: Case, keeper: CheckpointWriter, folder: Path, *, progress: bool | Progress = True, threads: int | None = None
 ) -> xr.Dataset:
     """Compute a case and return the result; its attributes contain everything that a second run needs.
 
-    The run continues from the checkpoint of the keeper, which also provides the fields of the result.
+    Paths in the attributes are relative to the folder of the result. The run continues from the checkpoint of the
+    keeper, which also provides the fields of the result.
 
     Raises
     ------
@@ -95,7 +96,7 @@ def compute(
     title = case.title
     for key, value in case.varied.items():
         title += f", {key} = {json.dumps(value)}"
-    now, stated = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"), case.to_json()
+    now, stated = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"), case.to_json(folder)
     ran = f"{now} {program_version()}: run of {case.origin.name if case.origin else 'a case'}"
     provenance = {
         "Conventions": dataset.attrs.pop("Conventions"),
@@ -175,7 +176,8 @@ def run_case(
                     log.warning("%s: is damaged: it is renamed to %s and computed again", path, aside.name)
                 keeper.resume()
                 try:
-                    dataset = compute(case, keeper, progress=progress, threads=threads)
+                    case = case.stored(folder)
+                    dataset = compute(case, keeper, folder, progress=progress, threads=threads)
                     write_result(dataset, path)
                 except RoughviscError as error:
                     if not error.transient:  # it would fail again in the same way

@@ -59,6 +59,6 @@ def test_result_folder__is_refused_before_anything_is_computed(study, tmp_path):
     case = read_study(study)
     assert result_folder(case) == tmp_path / "results" / "ball"
     assert result_folder(case, "here") == run_module.Path("here")
-    assert result_folder(replace(case, origin=None)) == run_module.Path("results/a-ball")
+    assert result_folder(case.with_fields(origin=None)) == run_module.Path("results/a-ball")
     with pytest.raises(InputError, match=r"ball\.toml: is a file: expected a folder"):
         result_folder(case, study / "below")

@@ -9,9 +9,11 @@ A creep function is not negative and does not decrease. For a passive material i
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from functools import wraps
+from inspect import signature
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +25,7 @@ from roughvisc.mechanics.quadrature import panels
 from roughvisc.units import Quantity, number, quantities
 
 Array = NDArray[np.float64]
+_Making = TypeVar("_Making", bound=Callable[..., Any])
 
 #: Largest shift factor; its inverse is the smallest. Factors beyond result from a temperature in a wrong unit.
 LARGEST_SHIFT = 1e30
@@ -45,6 +48,38 @@ def check_terms(name: str, terms: Sequence[float], unit: str, times: Sequence[fl
     for i, (term, time) in enumerate(zip(terms, times, strict=True)):
         number(term, unit, f"{name}[{i}]", least=0)
         number(time, "s", f"times[{i}]", above=0)
+
+
+def remembers_model(function: _Making) -> _Making:
+    """Decorate a function that returns a material, which then keeps the arguments of the call as its model."""
+    taking = signature(function)
+
+    @wraps(function)
+    def called(*args: Any, **given: Any) -> Any:
+        material = function(*args, **given)
+        model = {"model": function.__name__, **taking.bind(*args, **given).arguments}
+        return replace(material, model={name: value for name, value in model.items() if value is not None})
+
+    return called  # type: ignore[return-value]
+
+
+@dataclass(frozen=True)
+class SeriesError:
+    """Error of a series that replaces a creep function in a run.
+
+    Attributes
+    ----------
+    error : float
+        Largest relative deviation from `shortest` on. [-]
+    shortest : float
+        Shortest time of the fit. [s]
+    early : float
+        Error below the shortest time, see :func:`~roughvisc.mechanics.memory.early_error`. [-]
+    """
+
+    error: float
+    shortest: float
+    early: float
 
 
 @quantities(glassy="1/Pa >= 0", fluidity="1/(Pa s) >= 0", compliances="1/Pa ...", times="s ...")
@@ -74,6 +109,10 @@ class Prony:
         Warning about the measurements, for the result.
     misfit : float
         Largest relative deviation from the rows of a creep table, zero if it is within their noise.
+    model : mapping
+        Model of a study file that gives this material, and its arguments in SI; empty if unknown.
+    replaces : SeriesError, optional
+        Error of a series that replaces a creep function.
 
     Raises
     ------
@@ -92,6 +131,8 @@ class Prony:
     longest: float = field(default=math.inf, repr=False)
     warning: str = field(default="", compare=False, repr=False)
     misfit: float = field(default=0.0, compare=False, repr=False)
+    model: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
+    replaces: SeriesError | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "compliances", tuple(map(float, self.compliances)))
@@ -150,6 +191,7 @@ class Prony:
             compliances=tuple(one / modulus_factor for one in self.compliances),
             times=tuple(time_factor * one for one in self.times),
             longest=time_factor * self.longest,
+            replaces=self.replaces and replace(self.replaces, shortest=time_factor * self.replaces.shortest),
             note="; ".join(filter(None, (self.note, note))),
         )
 
@@ -206,6 +248,8 @@ class Creep:
         Largest deviation from measurements, of a pair with a measured body.
     stands_for : str
         Name of the bodies if the function is not one body with this Poisson ratio; otherwise empty.
+    model : mapping
+        Model of a study file that gives this material, and its arguments in SI; empty if unknown.
     """
 
     function: Callable[..., Any]
@@ -217,6 +261,7 @@ class Creep:
     warning: str = field(default="", compare=False)
     misfit: float = field(default=0.0, compare=False)
     stands_for: str = field(default="", compare=False)
+    model: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:
         return f"{self.function.__name__}({', '.join(map(repr, self.parameters))})"
@@ -333,6 +378,7 @@ def creep(function: Callable[[Array], Any], poisson: float = 0.5) -> Creep:
 
 
 @quantities(glassy="1/Pa >= 0", coefficient="1/Pa > 0", exponent="1 > 0", time_scale="s > 0")
+@remembers_model
 def power_law(
     glassy: Quantity, coefficient: Quantity, exponent: float, time_scale: Quantity = 1.0, poisson: float = 0.5
 ) -> Creep:
@@ -381,6 +427,7 @@ def pair_creep(t: Array, a: Material, b: Material) -> Array:
     return 4 * (a.contact_compliance(t) + b.contact_compliance(t))
 
 
+@remembers_model
 def pair(a: Material, b: Material) -> Material:
     """Two deformable bodies: their contact compliances add.
 
@@ -544,7 +591,8 @@ def shift(material: Material, factor: float) -> Material:
     """
     factor = number(factor, "1", "factor", least=1 / LARGEST_SHIFT, most=LARGEST_SHIFT)
     note = f"all times multiplied by {factor:.6g} (time-temperature shift)"
-    return check_material(material).scaled(factor, 1.0, note)
+    shifted, model = check_material(material).scaled(factor, 1.0, note), material.model
+    return replace(shifted, model={**model, "shift_factor": factor * model.get("shift_factor", 1.0)} if model else {})
 
 
 def stiffened(material: Material, factor: float) -> Material:

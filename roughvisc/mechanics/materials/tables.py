@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.material import Prony
+from roughvisc.mechanics.materials.material import Prony, remembers_model
 from roughvisc.mechanics.materials.models import Kind, relaxation_series, tensile_to_shear
 from roughvisc.mechanics.materials.series import lattice, nonnegative
 from roughvisc.units import Quantity, format_quantity, listed, number, quantities
@@ -43,6 +43,7 @@ _DECADE = 10.0 * (1 + 1e-9)
 
 
 @quantities(times="s ...", compliances="1/Pa ...", noise="1 >= 0")
+@remembers_model
 def creep_table(
     times: Sequence[Quantity],
     compliances: Sequence[Quantity],
@@ -111,6 +112,7 @@ def creep_table(
 
 
 @quantities(times="s ...", moduli="Pa ...")
+@remembers_model
 def relaxation_table(
     times: Sequence[Quantity], moduli: Sequence[Quantity], kind: Kind = "shear", poisson: float = 0.5
 ) -> Prony:
@@ -158,6 +160,7 @@ def relaxation_table(
 
 
 @quantities(frequencies="1 ...", storage="Pa ...", loss="Pa ...")
+@remembers_model
 def dynamic_table(
     frequencies: Sequence[float],
     storage: Sequence[Quantity],
