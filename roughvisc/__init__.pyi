@@ -10,6 +10,7 @@ from roughvisc.errors import EdgeContactError as EdgeContactError
 from roughvisc.errors import InputError as InputError
 from roughvisc.errors import RoughviscError as RoughviscError
 from roughvisc.errors import TooLargeError as TooLargeError
+from roughvisc.experiment.sliding import SteadySliding as SteadySliding
 from roughvisc.judge.audit import audit as audit
 from roughvisc.judge.budget import budget as budget
 from roughvisc.judge.plan import plan as plan

@@ -68,7 +68,9 @@ def result_folder(case: Case, out: str | Path | None = None) -> Path:
     else:
         folder = Path("results") / (re.sub(r"[^a-z0-9]+", "-", case.title.lower()).strip("-") or "untitled")
     if not (there := existing_part(folder)).is_dir():
-        raise InputError(f"{there}: is a file: expected a folder for the results")
+        key, expected = "out" if out is not None else "", "a folder for the results"
+        text = f"{there}: is a file: expected {expected}"
+        raise InputError(f"{key}: {text}" if key else text, key=key, found=out, expected=expected)
     return folder
 
 

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.arguments import a_table, split
+from roughvisc.arguments import a_table, refuse_unknown, split
 from roughvisc.errors import InputError, RoughviscError, short_repr
 from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
@@ -43,7 +43,16 @@ from roughvisc.study.identity import (
     surface_identity,
 )
 from roughvisc.study.objects import experiment_of, experiment_table, material_table, surface_table, tables_of
-from roughvisc.study.study_file import TABLE_OF, in_si, parts_of, shift_factor, unit_of, with_files, without_late_times
+from roughvisc.study.study_file import (
+    TABLE_OF,
+    TABLES,
+    in_si,
+    parts_of,
+    shift_factor,
+    unit_of,
+    with_files,
+    without_late_times,
+)
 from roughvisc.study.sweep_table import MOST_CASES, SURROGATE, place, sweep_changes, value_at
 from roughvisc.topography.heights import digest_in, file_name, write_heights
 from roughvisc.topography.scans import read_toml, surface_height
@@ -470,7 +479,9 @@ def case_given(case: Any) -> Case:
 
 
 def cases_given(cases: Any) -> Sequence[Case]:
-    """Return a list of cases, or the cases of the study file at a path; refuse anything else."""
+    """Return a list of cases, a single case as a list, or the cases of a study file; refuse anything else."""
+    if isinstance(cases, Case):
+        return [cases]
     if isinstance(cases, str | PathLike):
         return read_cases(cases)
     if not isinstance(cases, Sequence) or not cases:
@@ -589,6 +600,7 @@ def changed(
     heights, function = case.heights, case.function
     placed: dict[str, Any] = {}
     written: dict[str, str] = {}
+    refuse_unknown("", {key: value for key, value in changes.items() if "." not in key}, (*TABLES, *TABLE_OF))
     for key, value in changes.items():
         if key == "surface" and _is_object(key, value):
             placed["surface"], heights = surface_table(value)

@@ -20,6 +20,8 @@ from roughvisc.topography.grid import checked
 
 #: Name of the file of heights with a digest.
 _NAME = re.compile(r"heights-([0-9a-f]{16})\.nc")
+#: Key of the digest in the encoding of heights, which are not changed once it is known.
+_KNOWN = "digest"
 #: Attributes of heights that influence a solve.
 _USED = ("recipe", "period", "missing", "filled_fraction")
 
@@ -32,7 +34,9 @@ def digest_in(name: str) -> str:
 
 def file_name(h: xr.DataArray) -> str:
     """Return the name of the file of heights from :func:`plain_heights`."""
-    return f"heights-{digest_of(h)}.nc"
+    if _KNOWN not in h.encoding:
+        h.encoding[_KNOWN] = digest_of(h)
+    return f"heights-{h.encoding[_KNOWN]}.nc"
 
 
 def digest_of(h: xr.DataArray) -> str:
@@ -60,7 +64,8 @@ def plain_heights(heights: Any) -> xr.DataArray:
     except InputError as error:
         text = str(error) if str(error).startswith("surface") else f"surface: {error}"
         raise type(error)(text, key="surface", found=heights, expected=error.expected) from error
-    h = h.drop_vars([name for name in h.coords if name not in ("x", "y", "filled")]).rename("height")
+    h = h.drop_vars([name for name in h.coords if name not in ("x", "y", "filled")]).rename("height").drop_encoding()
+    h = h.copy(data=h.values.copy())  # the caller may change the array
     plain = {}
     for name, value in h.attrs.items():
         if isinstance(value, str | Number) and not isinstance(value, bool | complex):

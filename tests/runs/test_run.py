@@ -1,7 +1,5 @@
 """One case to one file: what the file says of itself, and what happens when something goes wrong."""
 
-from dataclasses import replace
-
 import pytest
 import xarray as xr
 from support import BALL, with_steps
