@@ -19,7 +19,7 @@ LAYERS = (
     ("judge",),
     ("plot",),
     ("reports",),
-    ("__init__ __main__ api cli",),
+    ("__init__ __main__ api cli materials surfaces",),
 )
 PLACE = {name: (layer, part) for layer, parts in enumerate(LAYERS) for part in parts for name in part.split()}
 

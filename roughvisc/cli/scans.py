@@ -95,6 +95,7 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, **op
     from roughvisc.cli.summaries import findings_table, scan_table
     from roughvisc.plot.save import is_made_by, write_figure
     from roughvisc.runs.folder import atomic_write, write_text
+    from roughvisc.topography.inspection import inspection_of
     from roughvisc.topography.scans import card_text, known_suffix, surface_table
 
     height = _opened(file, options)
@@ -105,7 +106,7 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, **op
     for out in filter(None, (plot, to, card)):
         if out.exists() and not (out is plot and is_replaced):
             raise InputError(f"{out}: already exists: expected another name")
-    levelled, found = rv.level(height), rv.inspect(height)
+    levelled, found = rv.level(height), inspection_of(height)
     text = card_text(file, card.parent, options, found.steps) if card else ""
     console = screen()
     console.print(scan_table(height, rv.parameters(levelled), file.name), "", findings_table(found), "", sep="\n")
@@ -145,6 +146,7 @@ def new(file: Path | None, out: Path | None, contact: str, **options: Any) -> No
     from roughvisc.runs.folder import atomic_write, write_text
     from roughvisc.study.first_study import first_pressure, starter_study
     from roughvisc.topography import EXAMPLE
+    from roughvisc.topography.inspection import inspection_of
     from roughvisc.units import number
 
     part = number(contact, "1", "contact", above=0, below=1)
@@ -159,7 +161,7 @@ def new(file: Path | None, out: Path | None, contact: str, **options: Any) -> No
         with atomic_write(source) as temporary:
             temporary.write_bytes(shipped)
     height = _opened(source, options)
-    found = rv.inspect(height)
+    found = inspection_of(height)
     first = first_pressure(height, found, part)
     write_text(out, starter_study(source, out, options, found, first))
     if first.miss:

@@ -469,13 +469,13 @@ def read_cases(path: str | Path) -> list[Case]:
     return cases
 
 
-def case_given(case: Any) -> Case:
+def case_given(case: Any, key: str = "case") -> Case:
     """Return a case, or the case of the study file at a path; refuse anything else."""
     if isinstance(case, Case):
         return case
     if isinstance(case, str | PathLike):
         return read_study(case)
-    raise InputError(key="case", found=case, expected="a Case, such as rv.read_study(...), or the path of a study file")
+    raise InputError(key=key, found=case, expected="a Case, such as rv.read_study(...), or the path of a study file")
 
 
 def cases_given(cases: Any) -> Sequence[Case]:
