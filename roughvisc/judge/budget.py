@@ -545,6 +545,7 @@ def budget(
     out: str | Path | None = None,
     client: Client | None = None,
     workers: int | None = None,
+    threads: int | None = None,
     progress: bool = True,
 ) -> xr.Dataset:
     r"""Estimate the total uncertainty of a number of a case, by source.
@@ -565,7 +566,7 @@ def budget(
         Whether the number describes this patch, the default, or the roughness from which the patch is a sample.
     out : path, optional
         Folder of the further solves, which are kept and used again. Default: ``budget`` in the folder of the results.
-    client, workers
+    client, workers, threads
         As in :func:`roughvisc.sweep`.
     progress : bool
         Show a progress bar.
@@ -608,7 +609,7 @@ def budget(
     base, own = with_kept(case, [field for one in observed for field in one.fields]), None
     if set(base.settings.fields) <= set(case.settings.fields) and is_result_of(case, finished):
         own = open_result(finished)
-    computing = {"progress": progress, "client": client, "workers": workers}
+    computing = {"progress": progress, "client": client, "workers": workers, "threads": threads}
     found = compared(base, sources_of(base, base.height(), known), observed, folder, own, **computing)
     if isinstance(quantity, str):
         return found[quantity]

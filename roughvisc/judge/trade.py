@@ -55,6 +55,7 @@ def trade(
     quantity: str | Sequence[str] = (),
     out: str | Path | None = None,
     progress: bool = True,
+    threads: int | None = None,
 ) -> xr.Dataset:
     """Compute one case with several tolerances and grids, and measure cost and error of each.
 
@@ -73,6 +74,8 @@ def trade(
         the results.
     progress : bool
         Show a progress bar.
+    threads : int, optional
+        Number of threads for a large grid; see :func:`roughvisc.simulate`.
 
     Returns
     -------
@@ -131,7 +134,7 @@ def trade(
     base = with_kept(case, ["pressure", *(field for one in observed for field in one.fields)], times)
     folder = path_of(out, "out").expanduser() if out is not None else result_folder(case) / FOLDER
     cases = {one: on_cells(changed(base, {"solve.tolerance": one[0]}), height, one[1]) for one in wanted}
-    solved = solve(cases.values(), folder, progress=progress)
+    solved = solve(cases.values(), folder, progress=progress, threads=threads)
     results = {}
     for setting, one in cases.items():
         derived = {

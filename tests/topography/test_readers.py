@@ -14,6 +14,7 @@ import xarray as xr
 from scan_files import CELL, ROOT, SCANS, SHAPE, TABLE, card, file_card, real, refusal, tilted, write_x3p
 from support import refused
 
+import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.topography import formats
 from roughvisc.topography.formats import Channel, ScanFile, add_format, supported_formats
@@ -306,3 +307,22 @@ def test_add_format__is_read_by_suffix_and_by_name(tmp_path, monkeypatch):
     assert supported_formats()["ours"] == ("our",)
     add_format("ours", [], read)
     assert supported_formats()["ours"] == ()
+
+
+def test_topography_of_surface_topography__is_the_file_read_here_and_comes_back():
+    from SurfaceTopography import read_topography
+
+    path = rv.example_scan()
+    opened, other = rv.open_scan(path), read_topography(path)
+    for found in (rv.from_topography(other), rv.from_topography(rv.to_topography(opened, unit="um"))):
+        np.testing.assert_allclose(found, opened, rtol=1e-12)
+        np.testing.assert_allclose(found.x, opened.x, rtol=1e-12)
+        np.testing.assert_allclose(found.y, opened.y, rtol=1e-12)
+    with refused("topography"):
+        rv.from_topography(opened)
+
+
+def test_surface_of_surfalize__has_lines_from_the_top_in_micrometres():
+    top_first = SimpleNamespace(data=np.array([[4.0, 5.0, 6.0], [1.0, 2.0, 3.0]]), step_x=0.5, step_y=2.0)
+    expected = rv.from_array(1e-6 * np.array([[1.0, 4.0], [2.0, 5.0], [3.0, 6.0]]), ("0.5 um", "2 um"))
+    xr.testing.assert_allclose(rv.from_topography(top_first), expected)
