@@ -64,6 +64,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Case", "read_cases", "read_study", "vary"]
 
+#: Keys whose value may be a list, so that only a list of lists contains several values.
+_LISTS = ("program", "fields", "times", "speeds", "shape", "size", "spacing", "resample", "x", "y", "offset")
+_LISTS += ("moduli", "ratios", "compliances", "frequencies", "storage", "loss", "shift_factors", "values")
 #: Arguments of a case that objects of Python state.
 _OBJECTS = ("surface", "material", "program")
 
@@ -503,7 +506,8 @@ def vary(case: Case, changes: Mapping[str, Any], *, zip: bool = False) -> Any:
     changes : mapping
         Argument of :class:`Case`, or dotted key of a study file -> value, list of values, or dictionary of name ->
         value: ``{"tolerance": [1e-2, 1e-3], "program": {"ramp": ramp, "hold": hold}, "material.poisson": 0.45}``. A
-        tuple or an array is one value. None removes a key. Values of ``surface``, ``material`` and ``program`` are
+        tuple or an array is one value, and so is a list of numbers or texts for a key that takes one, such as
+        ``times``, ``fields`` and ``surface.shape``. None removes a key. Values of ``surface``, ``material`` and ``program`` are
         objects of Python or tables of a study file. A name is the value of the varied parameter in results.
     zip : bool
         Combine the lists entry by entry. Default: their product, the last one varying fastest.
@@ -562,6 +566,9 @@ def _choices(key: str, value: Any) -> list[tuple[str, Any]] | None:
             return None
         return [(str(name), one) for name, one in value.items()]
     if not isinstance(value, list):
+        return None
+    several = [isinstance(one, list | tuple) or _is_object(key, one) for one in value]
+    if key.rpartition(".")[2] in _LISTS and not (value and all(several)):
         return None
     if not value:
         raise InputError(key=key, found=value, expected="at least one value; a tuple is one value")
