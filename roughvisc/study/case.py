@@ -508,7 +508,8 @@ def vary(case: Case, changes: Mapping[str, Any], *, zip: bool = False) -> Any:
         value: ``{"tolerance": [1e-2, 1e-3], "program": {"ramp": ramp, "hold": hold}, "material.poisson": 0.45}``. A
         tuple or an array is one value, and so is a list of numbers or texts for a key that takes one, such as
         ``times``, ``fields`` and ``surface.shape``. None removes a key. Values of ``surface``, ``material`` and
-        ``program`` are objects of Python or tables of a study file. A name is the value of the varied parameter in results.
+        ``program`` are objects of Python or tables of a study file. A name is the value of the varied parameter in
+        results.
     zip : bool
         Combine the lists entry by entry. Default: their product, the last one varying fastest.
 
