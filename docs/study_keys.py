@@ -18,6 +18,7 @@ from roughvisc.mechanics.program import UNITS, Program
 from roughvisc.settings import Numerics, Settings
 from roughvisc.study.machine_history import read_history
 from roughvisc.study.material_file import COLUMNS
+from roughvisc.study.properties import properties
 from roughvisc.study.study_file import PROGRAMS, SEGMENTS, SPECTRUM, TABLE_OF, unit_of
 from roughvisc.topography.conditioning import FACE_STEPS, STEPS
 from roughvisc.topography.recipes import RECIPES, surrogate
@@ -165,7 +166,7 @@ TABLES = {
     "observe": ("observe", {}),
     "observe.leakage": ("observe.leakage", _all(rv.observables.leakage, skipped=1)),
     "observe.conductance": ("observe.conductance", _all(rv.observables.conductance, skipped=1)),
-    "audit": ("audit", _all(rv.audit, skipped=1)),
+    "audit": ("audit", _of(rv.audit, *arguments(properties))),
 }
 #: Units that depend on another key.
 _UNITS = {

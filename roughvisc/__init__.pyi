@@ -1,7 +1,9 @@
 """The public names of roughvisc and the modules that define them: for editors, for mypy, and for ``__init__.py``."""
 
+from roughvisc import materials as materials
 from roughvisc import observables as observables
 from roughvisc import plot as plot
+from roughvisc import surfaces as surfaces
 from roughvisc.api import friction as friction
 from roughvisc.api import run as run
 from roughvisc.api import simulate as simulate
@@ -10,6 +12,7 @@ from roughvisc.errors import EdgeContactError as EdgeContactError
 from roughvisc.errors import InputError as InputError
 from roughvisc.errors import RoughviscError as RoughviscError
 from roughvisc.errors import TooLargeError as TooLargeError
+from roughvisc.experiment.sliding import SteadySliding as SteadySliding
 from roughvisc.judge.audit import audit as audit
 from roughvisc.judge.budget import budget as budget
 from roughvisc.judge.plan import plan as plan
@@ -42,6 +45,7 @@ from roughvisc.plot.report import report as report
 from roughvisc.runs.csv_files import to_csv as to_csv
 from roughvisc.runs.csv_files import to_table as to_table
 from roughvisc.runs.netcdf import open_result as open_result
+from roughvisc.runs.netcdf import save_result as save_result
 from roughvisc.runs.observed import observe as observe
 from roughvisc.runs.sweep import sweep as sweep
 from roughvisc.runs.sweep_data import open_results as open_results
@@ -56,6 +60,8 @@ from roughvisc.study.records import fit_material as fit_material
 from roughvisc.study.records import read_record as read_record
 from roughvisc.study.sweep_table import over_realisations as over_realisations
 from roughvisc.topography import example_scan as example_scan
+from roughvisc.topography.exchange import from_topography as from_topography
+from roughvisc.topography.exchange import to_topography as to_topography
 from roughvisc.topography.filters import fill as fill
 from roughvisc.topography.filters import gaussian_filter as gaussian_filter
 from roughvisc.topography.filters import level as level

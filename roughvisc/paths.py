@@ -1,14 +1,15 @@
-"""Paths as arguments, and the reading of files: regular files only, and one sentence for a file that cannot be read."""
+"""Paths as arguments; reading of regular files, with one sentence for a file that cannot be read; atomic writing."""
 
 from __future__ import annotations
 
 import errno
 import os
+import secrets
 import shlex
 import stat
 import subprocess
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from io import BufferedReader
 from pathlib import Path
 from typing import Any
@@ -128,3 +129,77 @@ def cause_of_system(error: BaseException) -> str:
     if isinstance(error, OSError) and (error.errno or 0) > 0 and error.errno != errno.EINVAL:
         return f"cannot be read: {error.strerror or error}"
     return ""
+
+
+def existing_part(folder: Path) -> Path:
+    """Return the folder, or its nearest parent that exists."""
+    return next(filter(Path.exists, (folder, *folder.absolute().parents)))
+
+
+def require_writable(folder: Path, why: str = "") -> None:
+    """Refuse a folder in which files cannot be created.
+
+    Raises
+    ------
+    InputError
+        If neither the folder nor a file in it can be created; the message includes the purpose `why`.
+    """
+    if not os.access(there := existing_part(folder), os.W_OK):
+        needed = f", {why}" if why else ""
+        text = f"{there}: is not writable: expected a folder with write permission{needed}"
+        raise InputError(text, transient=True)
+
+
+@contextmanager
+def atomic_write(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary name; the file becomes `path` if the block succeeds and is removed if it fails.
+
+    Parameters
+    ----------
+    path : path
+        Final path of the file. Its folder is created if necessary.
+
+    Yields
+    ------
+    Path
+        Name in the same folder, with the same suffix.
+
+    Raises
+    ------
+    InputError
+        If the path is a folder, a pipe or a device, or its folder cannot be created or written to.
+    """
+    path = path_of(path, "path")
+    if os.path.exists(path) and (flaw := flaw_of(path)):  # a rename would remove a device, and fails on a folder
+        raise InputError(f"{path}: {flaw}: expected a file to replace, or another name", transient=True)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        text = f"{path.parent}: cannot be made: {error.strerror or error}: expected a folder"
+        raise InputError(text, transient=True) from error
+    require_writable(path.parent)
+    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
+    try:
+        yield temporary
+        _sync(temporary)
+        os.replace(temporary, path)
+        with suppress(PermissionError):  # Windows cannot open a folder
+            _sync(path.parent)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a text to a file atomically."""
+    with atomic_write(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", errors="surrogateescape")  # as in the names of files
+    return path
+
+
+def _sync(path: Path) -> None:
+    """Flush a file, or the directory entries of a folder, to the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -15,7 +15,7 @@ from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.memory import Memory
 from roughvisc.mechanics.stepping import Scene
 from roughvisc.runs.netcdf import open_result
-from roughvisc.study.case import read_study, vary
+from roughvisc.study.case import changed, read_study
 from roughvisc.variables import VARIABLES
 
 #: The ball, the rubber and the press of BALL.
@@ -188,7 +188,7 @@ boundary = "periodic"
 def case_of(tmp_path, text=STUDY, **changes):
     path = tmp_path / "study.toml"
     path.write_text(text)
-    return vary(read_study(path), {key.replace("__", "."): value for key, value in changes.items()})
+    return changed(read_study(path), {key.replace("__", "."): value for key, value in changes.items()})
 
 
 def measured(case, *settings, **options):

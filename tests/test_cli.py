@@ -212,7 +212,7 @@ def test_new__without_a_file_begins_with_an_example(invoke, tmp_path):
     (case,) = read_cases("focus_variation-study.toml")
     assert case.height().shape == (160, 256)
     assert (case.material, case.settings.boundary) == (RUBBER, "mirror")
-    ds = rv.run(vary(case, {"surface.resample": [20, 32], "keep.times": 2}), progress=False)
+    ds = rv.run(vary(case, {"surface.resample": (20, 32), "keep.times": 2}), progress=False)
     assert 0 < float(ds.contact_fraction[-1]) < 1
     assert invoke("new", "-o", "again.toml")[0] == 0, "the scan is there already"
     (tmp_path / "focus_variation.x3p").write_bytes(b"mine")

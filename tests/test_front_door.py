@@ -12,14 +12,18 @@ from support import refused
 import roughvisc as rv
 
 
-@pytest.mark.parametrize("module", [rv, rv.plot, rv.observables, rv.closed_forms], ids=lambda one: one.__name__)
+@pytest.mark.parametrize(
+    "module", [rv, rv.plot, rv.observables, rv.closed_forms, rv.materials, rv.surfaces], ids=lambda one: one.__name__
+)
 def test_completion__shows_what_users_call_and_nothing_else(module):
     shown = dir(module)
     for name in set(shown) - {"__version__"}:
         one = getattr(module, name)
         assert not name.startswith("_")
         if inspect.ismodule(one):
-            assert (module, name) in {(rv, "plot"), (rv, "observables"), (rv, "closed_forms")}
+            assert (module, name) in {
+                (rv, part) for part in ("plot", "observables", "closed_forms", "materials", "surfaces")
+            }
         else:
             assert callable(one), name
             assert one.__module__.startswith("roughvisc."), f"{name} comes from elsewhere"

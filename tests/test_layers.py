@@ -18,7 +18,7 @@ LAYERS = (
     ("runs",),
     ("judge",),
     ("plot",),
-    ("__init__ __main__ api cli",),
+    ("__init__ __main__ api cli materials surfaces",),
 )
 PLACE = {name: (layer, part) for layer, parts in enumerate(LAYERS) for part in parts for name in part.split()}
 

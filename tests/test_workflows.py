@@ -45,7 +45,7 @@ def script(monkeypatch):
 
 def test_stop_and_go__has_a_peak_after_the_rest(tmp_path):
     (case,) = read_cases(FOLDER / "stop_and_go.toml")
-    ds = run(vary(case, {"surface.shape": [50, 40], "keep.fields": []}), tmp_path, progress=False)
+    ds = run(vary(case, {"surface.shape": (50, 40), "keep.fields": ()}), tmp_path, progress=False)
     steps = history(ds)
     ends = steps.friction_coefficient.sel(time=case.program.corners[2:5:2], method="nearest").values
     assert ends == pytest.approx([ends[1]] * 2, rel=0.01), "both strokes along x settle at one friction"

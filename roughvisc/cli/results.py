@@ -142,12 +142,13 @@ def audit(result: Path, **properties: Any) -> None:
       roughvisc audit results/focus_variation-study --work-of-adhesion "50 mJ/m^2"
     """
     from roughvisc.cli.study_tables import audit_table
+    from roughvisc.judge.audit import audit_of
     from roughvisc.runs.folder import results_at
 
     given = {name: value for name, value in properties.items() if value is not None}
     for path in results_at(result):
         with rv.open_result(path) as dataset:
-            screen().print(audit_table(rv.audit(dataset, **given)), "", sep="\n")
+            screen().print(audit_table(audit_of(dataset, **given)), "", sep="\n")
 
 
 @click.command()

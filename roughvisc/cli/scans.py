@@ -109,6 +109,7 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, **op
     from roughvisc.plot.save import is_made_by, write_figure
     from roughvisc.progress import sign_of_life
     from roughvisc.runs.folder import atomic_write, write_text
+    from roughvisc.topography.inspection import inspection_of
     from roughvisc.topography.scans import card_text, known_suffix, surface_table
 
     height = _opened(file, options)
@@ -121,7 +122,7 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, **op
             raise InputError(f"{out}: already exists: expected another name")
     with sign_of_life("inspects the scan"):
         levelled = rv.level(height)
-        found = rv.inspect(height)
+        found = inspection_of(height)
         measures = rv.parameters(levelled)
     text = card_text(file, card.parent, options, found.steps) if card else ""
     console = screen()
@@ -167,6 +168,7 @@ def new(file: Path | None, out: Path | None, contact: str, **options: Any) -> No
     from roughvisc.runs.folder import atomic_write, write_text
     from roughvisc.study.first_study import first_pressure, starter_study
     from roughvisc.topography import EXAMPLE
+    from roughvisc.topography.inspection import inspection_of
     from roughvisc.units import number
 
     part = number(contact, "1", "contact", above=0, below=1)
@@ -182,7 +184,7 @@ def new(file: Path | None, out: Path | None, contact: str, **options: Any) -> No
             temporary.write_bytes(shipped)
     height = _opened(source, options)
     with sign_of_life("inspects the scan"):
-        found = rv.inspect(height)
+        found = inspection_of(height)
         first = first_pressure(height, found, part)
     write_text(out, starter_study(source, out, options, found, first))
     if first.miss:

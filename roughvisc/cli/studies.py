@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -99,7 +98,7 @@ def run(
 
     cases = rv.read_cases(study)
     if device is not None:
-        cases = [replace(rv.vary(case, {"solve.device": device}), varied=case.varied) for case in cases]
+        cases = [rv.vary(case, {"solve.device": device}).with_fields(varied=case.varied) for case in cases]
     if targets and len(cases) > 1:
         raise InputError(key="for", found=targets[0], expected=f"one case, and {study} has {len(cases)}")
     folder, console = result_folder(cases[0], out), screen(quiet)

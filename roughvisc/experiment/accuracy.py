@@ -16,6 +16,8 @@ from roughvisc.experiment.profile import Profile
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.contact.solver import PERIMETER_CORRECTION
 from roughvisc.mechanics.grid import namespace
+from roughvisc.mechanics.materials.material import Material, Prony
+from roughvisc.mechanics.materials.models import creep_series
 from roughvisc.mechanics.memory import SERIES_SHARE, Memory, choose_memory
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.scene import Scene
@@ -66,11 +68,18 @@ def memory_of(body: Body, program: Program, settings: Settings, **options: Any) 
         Body, program and settings of the case.
     **options
         Further arguments of :func:`~roughvisc.mechanics.memory.choose_memory`.
+    """
+    return choose_memory(body, program.duration, settings.tolerance, shortest_age(program, settings), **options)
+
+
+def shortest_age(program: Program, settings: Settings) -> float:
+    """Return the shortest age above zero at which the compliance affects the kept rows. [s]
+
+    Zero for a program of jumps alone.
 
     Notes
     -----
-    ``shortest`` is the shortest age above zero at which the compliance affects the kept rows; zero for a program of
-    jumps alone. Let ``h`` be the shortest interval between a corner of the program and the next kept time. Only
+    Let ``h`` be the shortest interval between a corner of the program and the next kept time. Only
     pressure applied in the last part ``f`` of the interval has an age below ``f h``. If the compliance is exact at age
     zero, its error at these ages is at most the creep, which is less than ``f C(h)`` over the interval. With ``f`` a
     tenth of the tolerance this equals the error allowed at longer ages. No step is shorter than a millionth of a
@@ -90,7 +99,26 @@ def memory_of(body: Body, program: Program, settings: Settings, **options: Any) 
         corners, after = corners[after < times.size], after[after < times.size]
         shortest = min(shortest, float(np.min(times[after] - corners, initial=math.inf)))
         shortest *= max(SERIES_SHARE * settings.tolerance, SHORTEST_PAIR)
-    return choose_memory(body, program.duration, settings.tolerance, shortest, **options)
+    return shortest
+
+
+def series_of_run(material: Material, program: Program, settings: Settings) -> Prony:
+    """Return the series that a run uses in place of a creep function, with the error of the series."""
+    memory = memory_of(Body(material), program, settings)
+    found = memory.series
+    if not memory.series_error:
+        return found
+    return creep_series(
+        found.glassy,
+        found.fluidity,
+        found.compliances,
+        found.times,
+        found.poisson,
+        error=memory.series_error,
+        shortest=memory.shortest,
+        longest=program.duration,
+        early=memory.early,
+    )
 
 
 def error_columns(step: Step, scene: Scene) -> dict[str, float]:

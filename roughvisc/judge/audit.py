@@ -5,12 +5,14 @@ A scene holds surface, contact and bodies of a result. Each check returns the si
 
 from __future__ import annotations
 
+import inspect
 import json
 import math
 import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,7 +26,10 @@ from roughvisc.mechanics.body import HALF_SPACE
 from roughvisc.mechanics.heating import spot_count, surface_rise
 from roughvisc.mechanics.sheet import BASE, Base, Sheet, factors
 from roughvisc.observables.history import expect_result, history
-from roughvisc.study.case import Case
+from roughvisc.runs.netcdf import open_result
+from roughvisc.runs.run import result_folder
+from roughvisc.runs.sweep import run_one
+from roughvisc.study.case import Case, case_given
 from roughvisc.study.properties import properties
 from roughvisc.topography.borders import border_mismatch
 from roughvisc.topography.framing import mirror
@@ -502,7 +507,7 @@ class Audit:
 
 
 def audit(
-    result: xr.Dataset,
+    result: xr.Dataset | Case | str | Path,
     *,
     work_of_adhesion: Quantity | None = None,
     yield_strength: Quantity | None = None,
@@ -511,13 +516,17 @@ def audit(
     density: Quantity | None = None,
     heat_conductivity: Quantity | None = None,
     volumetric_heat_capacity: Quantity | None = None,
-) -> Audit:
+    out: str | Path | None = None,
+    progress: bool = True,
+    threads: int | None = None,
+) -> xr.Dataset:
     """Check the assumptions of the model for a result.
 
     Parameters
     ----------
-    result : xarray.Dataset
-        A result of one case.
+    result : xarray.Dataset, Case or path
+        A result of one case. A case or its study file is computed first, as :func:`roughvisc.run` does, unless it is
+        finished.
     work_of_adhesion : float or str, optional
         Work of adhesion of the two surfaces. [J/m2]
     yield_strength : float or str, optional
@@ -532,13 +541,16 @@ def audit(
         Heat conductivity of the body. [W/(m K)]
     volumetric_heat_capacity : float or str, optional
         Volumetric heat capacity of the body: density times specific heat. [J/(m3 K)]
+    out, progress, threads
+        Of the computation of a case, as in :func:`roughvisc.run`.
 
     Returns
     -------
-    Audit
-        A number, a verdict and a sentence for each assumption that applies. Values that are not given come from the
-        table ``[audit]`` of the study, if there is one. If a value is missing, the verdict is ``not known``, and the
-        sentence names the missing input.
+    xarray.Dataset
+        Over ``assumption``, for each assumption that applies: ``verdict`` (holds, doubtful, broken or not known);
+        ``number``, which is compared with the limits ``doubtful`` and ``broken`` [-]; ``sentence``, the meaning of the
+        number. Values that are not given come from the table ``[audit]`` of the study, if there is one. If a value is
+        missing, the verdict is ``not known``, and the sentence names the missing input.
 
     Raises
     ------
@@ -551,29 +563,45 @@ def audit(
     the lowest modulus: the modulus at the end of the program, or for the longest wavelength at the lowest speed. With
     this modulus adhesion and inertia are largest.
 
+    See Also
+    --------
+    roughvisc.budget : the errors of a number.
+
     Examples
     --------
     >>> import roughvisc as rv
     >>> ball = rv.sphere(radius=1e-2, size=1e-3, shape=24)
     >>> ds = rv.simulate(ball, rv.elastic(1e6), rv.Program().load(5e-3, over=1.0), progress=False)
     >>> found = rv.audit(ds, work_of_adhesion="50 mJ/m^2")
-    >>> found["adhesion"].verdict, found["slope"].verdict, found["yielding"].verdict
-    ('broken', 'holds', 'not known')
+    >>> found.verdict.sel(assumption=["adhesion", "slope", "yielding"]).values.tolist()
+    ['broken', 'holds', 'not known']
     """
-    given = properties(
-        work_of_adhesion=work_of_adhesion,
-        yield_strength=yield_strength,
-        thickness=thickness,
-        base=base,
-        density=density,
-        heat_conductivity=heat_conductivity,
-        volumetric_heat_capacity=volumetric_heat_capacity,
-    )
+    given = dict(locals())
+    named = {name: given[name] for name in inspect.signature(properties).parameters}
+    if not isinstance(result, xr.Dataset):
+        case = case_given(result, "result")
+        result = open_result(run_one(case, result_folder(case, out), progress=progress, threads=threads))
+    found = audit_of(result, **named)
+    columns = {
+        "verdict": ("verdict", [one.verdict for one in found]),
+        "number": ("number that is compared with the limits", [one.number for one in found]),
+        "doubtful": ("number from which the assumption is doubtful", [one.limit.doubtful for one in found]),
+        "broken": ("number from which the assumption is broken", [one.limit.broken for one in found]),
+        "sentence": ("meaning of the number", [one.sentence for one in found]),
+    }
+    variables = {name: ("assumption", values, {"long_name": text}) for name, (text, values) in columns.items()}
+    return xr.Dataset(variables, {"assumption": [one.name for one in found]}, {"title": found.title})
+
+
+def audit_of(result: xr.Dataset, **given: Any) -> Audit:
+    """Return the findings for a result; see :func:`audit`."""
+    given = properties(**given)
     result = expect_result(result, "force", "approach", "contact_area", "contact_fraction")
     expect_result(result, *(name for name in ("height", "pressure") if name in result))
     case = None
     if "case" in result.attrs:
-        case = Case.from_json(result.attrs["case"])
+        source = result.encoding.get("source")
+        case = Case.from_json(result.attrs["case"], Path(source).parent if source else None)
         given = {**case.audit_inputs, **given}
     scene, findings = Scene(result, given, case), []
     for name, limit in LIMITS.items():

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -29,7 +29,7 @@ from roughvisc.runs.folder import case_path
 from roughvisc.runs.netcdf import open_result
 from roughvisc.runs.run import is_result_of, result_folder
 from roughvisc.runs.sweep import run_cases
-from roughvisc.study.case import Case, case_given, vary
+from roughvisc.study.case import Case, case_given, changed
 from roughvisc.study.study_file import shift_factor, split_thermal
 from roughvisc.topography.conditioning import FACE_STEPS
 from roughvisc.topography.grid import spacing
@@ -208,11 +208,11 @@ def on_cells(case: Case, height: xr.DataArray, coarsening: float) -> Case:
         return case
     shape = list(shape_on(case, height, coarsening))
     if not is_data(case):
-        return vary(case, {"surface.shape": shape})
+        return changed(case, {"surface.shape": shape})
     changes: dict[str, Any] = {"surface.resample": [max(2, n) for n in shape]}
     if coarsening < 1 and case.surface.get("resample"):
         changes["surface.shortest_wave"] = max(case.surface.get("shortest_wave") or 0.0, 2 * max(spacing(height)))
-    return vary(case, changes)
+    return changed(case, changes)
 
 
 def with_kept(case: Case, fields: Iterable[str], times: Any = None) -> Case:
@@ -224,7 +224,7 @@ def with_kept(case: Case, fields: Iterable[str], times: Any = None) -> Case:
     changes: dict[str, Any] = {"keep.fields": kept, "solve.grid_error": False}
     if times is not None and case.experiment.axis == "time":
         changes["keep.times"] = times
-    return replace(vary(case, changes), varied=case.varied)
+    return changed(case, changes).with_fields(varied=case.varied)
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -307,7 +307,7 @@ def coarser_grids(base: Case, height: xr.DataArray, coarsening: float) -> tuple[
     fine, before, found = on_cells(base, height, coarsening), wave, []
     for part in (2.0, 4.0):  # two grids may agree by chance
         coarse, shortest = on_cells(base, height, part * coarsening), max(wave, 2 * part * cell)
-        against = vary(fine, {"surface.shortest_wave": shortest}) if shortest > _SAME * before else fine
+        against = changed(fine, {"surface.shortest_wave": shortest}) if shortest > _SAME * before else fine
         longer = shortest / wave if is_limited else 1.0
         found.append(Neighbour(coarse, GRID_SAFETY, against, longer / part, longer))
         fine, before = coarse, shortest
@@ -347,7 +347,7 @@ def sources_of(
 
     if sample and population == "ensemble":
         few = [max(2, round(n / (2 * others))) for n in height.shape]
-        patches = [vary(base, {"surface.resample": few, "surface.realisation": n + 1}) for n in range(_PATCHES)]
+        patches = [changed(base, {"surface.resample": few, "surface.realisation": n + 1}) for n in range(_PATCHES)]
         near = tuple(Neighbour(patch, _SAMPLE_FACTOR, coarse) for patch in patches)
         found[SAMPLE] = Source(f"{_PATCHES} Gaussian surrogates on cells twice as long", near)
     if sample and cutoff is None:
@@ -361,7 +361,7 @@ def sources_of(
         elif shortest >= _SAME * cutoff:
             octaves = math.log2(shortest / cutoff)
             words = f"without the shortest octave; {octaves:.2g} octaves down to {end} are missing"
-            smooth = vary(own, {"surface.shortest_wave": 2 * shortest})
+            smooth = changed(own, {"surface.shortest_wave": 2 * shortest})
             found[OCTAVE] = Source(words, (Neighbour(smooth, octaves, own),))
 
     # the contact of an indenter has few cells, so changes of its material are solved on the grid of the case
@@ -381,7 +381,7 @@ def sources_of(
             found[name] = Source(f"{key} is not given: the relative error of the {what}", is_open=True)
         elif error > 0:
             weight = math.log1p(error) / math.log(_CHANGE)
-            one = Neighbour(vary(compared, changes), weight, compared)
+            one = Neighbour(changed(compared, changes), weight, compared)
             found[name] = Source(f"{what} {100 * (_CHANGE - 1):.0f} % larger", (one,))
     return found
 
@@ -546,6 +546,7 @@ def budget(
     out: str | Path | None = None,
     client: Client | None = None,
     workers: int | None = None,
+    threads: int | None = None,
     progress: bool = True,
 ) -> xr.Dataset:
     r"""Estimate the total uncertainty of a number of a case, by source.
@@ -566,7 +567,7 @@ def budget(
         Whether the number describes this patch, the default, or the roughness from which the patch is a sample.
     out : path, optional
         Folder of the further solves, which are kept and used again. Default: ``budget`` in the folder of the results.
-    client, workers
+    client, workers, threads
         As in :func:`roughvisc.sweep`.
     progress : bool
         Show a progress bar.
@@ -613,7 +614,7 @@ def budget(
     base, own = with_kept(case, [field for one in observed for field in one.fields]), None
     if set(base.settings.fields) <= set(case.settings.fields) and is_result_of(case, finished):
         own = open_result(finished)
-    computing = {"progress": progress, "client": client, "workers": workers}
+    computing = {"progress": progress, "client": client, "workers": workers, "threads": threads}
     found = compared(base, sources_of(base, base.height(), known), observed, folder, own, **computing)
     if isinstance(quantity, str):
         return found[quantity]

@@ -29,7 +29,7 @@ from roughvisc.judge.budget import (
 from roughvisc.labels import cost_of
 from roughvisc.paths import path_of
 from roughvisc.runs.run import result_folder
-from roughvisc.study.case import Case, case_given, vary
+from roughvisc.study.case import Case, case_given, changed
 from roughvisc.topography.grid import spacing
 from roughvisc.units import number
 from roughvisc.variables import AXES
@@ -56,6 +56,7 @@ def trade(
     quantity: str | Sequence[str] = (),
     out: str | Path | None = None,
     progress: bool = True,
+    threads: int | None = None,
 ) -> xr.Dataset:
     """Compute one case with several tolerances and grids, and measure cost and error of each.
 
@@ -74,6 +75,8 @@ def trade(
         the results.
     progress : bool
         Show a progress bar.
+    threads : int, optional
+        Number of threads for a large grid; see :func:`roughvisc.simulate`.
 
     Returns
     -------
@@ -132,8 +135,8 @@ def trade(
         times = kept_times(experiment.program, times, *map(tuple, sides))
     base = with_kept(case, ["pressure", *(field for one in observed for field in one.fields)], times)
     folder = path_of(out, "out").expanduser() if out is not None else result_folder(case) / FOLDER
-    cases = {one: on_cells(vary(base, {"solve.tolerance": one[0]}), height, one[1]) for one in wanted}
-    solved = solve(cases.values(), folder, progress=progress)
+    cases = {one: on_cells(changed(base, {"solve.tolerance": one[0]}), height, one[1]) for one in wanted}
+    solved = solve(cases.values(), folder, progress=progress, threads=threads)
     results = {}
     for setting, one in cases.items():
         derived = {

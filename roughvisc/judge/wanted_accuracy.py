@@ -26,7 +26,7 @@ from roughvisc.runs.folder import atomic_write, case_path
 from roughvisc.runs.netcdf import open_result, write_dataset
 from roughvisc.runs.run import is_result_of, result_folder
 from roughvisc.runs.sweep import run_one
-from roughvisc.study.case import Case, vary
+from roughvisc.study.case import Case, changed
 from roughvisc.topography.grid import spacing
 from roughvisc.units import number
 
@@ -137,7 +137,7 @@ def choose(
         level = min(level, math.floor(math.log2(wave / (2 * max(spacing(height))) * (1 + 1e-9))))
     level = coarsest = max(level, 0)
     while True:
-        base = vary(base, {"solve.tolerance": float(f"{tolerance:.2g}")})
+        base = changed(base, {"solve.tolerance": float(f"{tolerance:.2g}")})
         chosen = neighbours.on_cells(base, height, 2.0**level)
         sources = neighbours.sources_of(base, height, want, 2.0**level, 2.0**coarsest)
         [own] = neighbours.solve([chosen], folder / neighbours.FOLDER, **computing).values()

@@ -33,7 +33,7 @@ from numpy.typing import ArrayLike
 from roughvisc.mechanics.body import Body, wave_limits
 from roughvisc.mechanics.grid import Grid, namespace
 from roughvisc.mechanics.layer import LayeredBody, LayerSeries, crept, interpolated, layer_series
-from roughvisc.mechanics.materials.material import Material, Prony, parts_of_step
+from roughvisc.mechanics.materials.material import Material, Prony, known_times, parts_of_step
 from roughvisc.mechanics.materials.series import series
 
 Array = Any  # an array of NumPy or CuPy
@@ -124,6 +124,8 @@ class Memory:
     """
 
     def __init__(self, series: Prony, duration: float, keeps_pressure: bool = False) -> None:
+        #: The series.
+        self.series = series
         factor = 0.5 * (1 - series.poisson)  # of the contact compliance over the shear compliance
         #: Contact compliance after a time [s], cached because few times recur often. [1/Pa]
         self.compliance = cast(Callable[[float], float], lru_cache(maxsize=64)(series.contact_compliance))
@@ -418,7 +420,9 @@ def choose_memory(
         memory.series_error, memory.misfit = error, body.material.misfit * (duration > 0)
         if error > 0 and duration > 0:
             memory.shortest = shortest
-            memory.early = early_error(body.material.creep_compliance, found.creep_compliance, shortest)
+            known = getattr(body.material, "replaces", None)
+            exact = body.material.creep_compliance
+            memory.early = known.early if known else early_error(exact, found.creep_compliance, shortest)
         within = f" in place of the compliance, within {error:.1e} of it at time zero and from {shortest:.1g} s"
         memory.note = "; ".join(filter(None, (memory.note + within * bool(error), body.material.note)))
     if memory.series_error > tolerance:
@@ -474,6 +478,9 @@ def _series(material: Material, shortest: float, duration: float, tolerance: flo
     """Return the series of a material and its error; a program of jumps needs the instantaneous compliance only."""
     if isinstance(material, Prony) and material.longest == math.inf:
         return material, 0.0
+    if isinstance(material, Prony) and material.replaces is not None:
+        known_times(duration, material.longest)
+        return replace(material, longest=math.inf, replaces=None), material.replaces.error
     if duration > 0:
         return series(material, shortest, duration, tolerance)
     glassy = float(material.creep_compliance(0.0))

@@ -20,7 +20,7 @@ from jinja2 import Environment, PackageLoader
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
-from roughvisc.judge.audit import audit
+from roughvisc.judge.audit import audit_of
 from roughvisc.labels import cost_of, grid_error_of, warnings_of
 from roughvisc.observables.history import expect_result
 from roughvisc.paths import path_of, shell_word
@@ -182,7 +182,7 @@ def _details(dataset: xr.Dataset, case: dict[str, Any], number: int, is_drawn: b
         picture = _picture(FIGURES["surface"][2], surface(height))
         found["surface"] = {"picture": picture, "parameters": parameters(off_plane(height.load()))[[*_PARAMETERS]]}
     with suppress(InputError):  # a Dataset that lacks the variables of an audit
-        found["audit"] = list(audit(dataset))
+        found["audit"] = list(audit_of(dataset))
     return found
 
 

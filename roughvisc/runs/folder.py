@@ -13,7 +13,6 @@ import json
 import logging
 import os
 import re
-import secrets
 import shutil
 import time
 import zlib
@@ -25,7 +24,11 @@ from typing import Any, Literal
 from filelock import FileLock, Timeout
 
 from roughvisc.errors import InputError
+from roughvisc.paths import atomic_write as atomic_write
+from roughvisc.paths import existing_part as existing_part
 from roughvisc.paths import flaw_of, path_of, read_bytes, regular
+from roughvisc.paths import require_writable as require_writable
+from roughvisc.paths import write_text as write_text
 from roughvisc.study.case import Case
 
 log = logging.getLogger("roughvisc")
@@ -54,7 +57,7 @@ def case_path(folder: Path, key: str, what: Literal["result", "lock", "checkpoin
 
 def result_files(folder: Path) -> list[Path]:
     """Return the files of a folder that may be results, sorted by name, without incomplete files."""
-    return sorted(path for path in folder.glob("*.nc") if not path.name.startswith("."))
+    return sorted(path for path in folder.glob("*.nc") if not path.name.startswith((".", "heights-")))
 
 
 def no_results(folder: Path) -> InputError:
@@ -77,25 +80,6 @@ def results_at(place: Path) -> list[Path]:
     return paths
 
 
-def existing_part(folder: Path) -> Path:
-    """Return the folder, or its nearest parent that exists."""
-    return next(filter(Path.exists, (folder, *folder.absolute().parents)))
-
-
-def require_writable(folder: Path, why: str = "") -> None:
-    """Refuse a folder in which files cannot be created.
-
-    Raises
-    ------
-    InputError
-        If neither the folder nor a file in it can be created; the message includes the purpose `why`.
-    """
-    if not os.access(there := existing_part(folder), os.W_OK):
-        needed = f", {why}" if why else ""
-        text = f"{there}: is not writable: expected a folder with write permission{needed}"
-        raise InputError(text, transient=True)
-
-
 def unusable(path: Path, found: str, expected: str = "a result of roughvisc (.nc)") -> InputError:
     """Return the error of an unexpected file. It is transient, because the file may be replaced."""
     text = f"{path}: {found}: expected {expected}"
@@ -106,61 +90,6 @@ def require_result(path: Path) -> None:
     """Refuse a path that is not a regular file; the key of the error is the path."""
     if flaw := flaw_of(path):
         raise unusable(path, flaw)
-
-
-@contextmanager
-def atomic_write(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary name; the file becomes `path` if the block succeeds and is removed if it fails.
-
-    Parameters
-    ----------
-    path : path
-        Final path of the file. Its folder is created if necessary.
-
-    Yields
-    ------
-    Path
-        Name in the same folder, with the same suffix.
-
-    Raises
-    ------
-    InputError
-        If the path is a folder, a pipe or a device, or its folder cannot be created or written to.
-    """
-    path = path_of(path, "path")
-    if os.path.exists(path) and (flaw := flaw_of(path)):  # a rename would remove a device, and fails on a folder
-        raise InputError(f"{path}: {flaw}: expected a file to replace, or another name", transient=True)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        text = f"{path.parent}: cannot be made: {error.strerror or error}: expected a folder"
-        raise InputError(text, transient=True) from error
-    require_writable(path.parent)
-    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}.part{path.suffix}")
-    try:
-        yield temporary
-        _sync(temporary)
-        os.replace(temporary, path)
-        with suppress(PermissionError):  # Windows cannot open a folder
-            _sync(path.parent)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def write_text(path: Path, text: str) -> Path:
-    """Write a text to a file atomically."""
-    with atomic_write(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", errors="surrogateescape")  # as in the names of files
-    return path
-
-
-def _sync(path: Path) -> None:
-    """Flush a file, or the directory entries of a folder, to the disk."""
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def write_json(path: Path, value: Any, default: Callable[[Any], Any] | None = None) -> None:
@@ -210,7 +139,7 @@ def lock_case(path: Path, patience: float = _PATIENCE) -> Iterator[None]:
 
 def record_failure(folder: Path, case: Case, **what: str) -> None:
     """Write the record of a failed case: its message, error and traceback, and the case."""
-    record = what | {"case": json.loads(case.to_json())}
+    record = what | {"case": json.loads(case.to_json(folder))}
     write_text(case_path(folder, case.key, "failure"), json.dumps(record, indent=1))
 
 

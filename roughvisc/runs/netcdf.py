@@ -29,6 +29,7 @@ from roughvisc.errors import InputError
 from roughvisc.labels import CARRIED, STEPS, label, steps_of
 from roughvisc.paths import cause_of_system, path_of
 from roughvisc.runs.folder import atomic_write, require_result, results_at, unusable
+from roughvisc.units import number
 from roughvisc.variables import AXES, RESULT_FORMAT, VARIABLES, axis_of
 
 #: Errors of the library for a file that it cannot read.
@@ -298,8 +299,8 @@ def write_result(dataset: xr.Dataset, path: str | Path) -> Path:
             full = shutil.disk_usage(temporary.parent).free < _NEARLY_FULL
             if not full and isinstance(error, PermissionError):
                 raise
-            number = errno.ENOSPC if full else errno.EIO
-            raise OSError(number, os.strerror(number), str(path)) from error
+            code = errno.ENOSPC if full else errno.EIO
+            raise OSError(code, os.strerror(code), str(path)) from error
     return Path(path)
 
 
@@ -307,6 +308,73 @@ def as_stored(dataset: xr.Dataset) -> xr.Dataset:
     """Return a result with the attributes that its file states."""
     root = label(dataset).assign_attrs(Conventions="CF-1.11", result_format=RESULT_FORMAT)
     return root.assign_attrs(_readable(root.attrs))
+
+
+def save_result(dataset: xr.Dataset, path: str | Path, *, gap_part: float | None = None) -> Path:
+    """Write a result with the history of its steps to a file, packed as :func:`roughvisc.run` packs it.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result of one case, as from :func:`roughvisc.simulate` or :func:`roughvisc.friction`, in memory or in a file.
+    path : path
+        The file, such as ``"contact.nc"``; an existing file is replaced. :func:`open_result` opens it.
+    gap_part : float, optional
+        Rounds the gap of each row to at most this part of the stated error of its approach. The gap is then compressed
+        to a fraction of its size, and its attribute ``rounding`` states the part. Default: the gap is not changed. [-]
+
+    Returns
+    -------
+    pathlib.Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If the Dataset is not a result, the file cannot be written, or `gap_part` is given for a result without a gap or
+        a stated error of the approach.
+
+    See Also
+    --------
+    roughvisc.open_result, roughvisc.to_csv
+
+    Examples
+    --------
+    >>> import tempfile, roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=33), rv.Program().load(1e-4, over=0).hold(1.0)
+    >>> ds = rv.simulate(ball, rv.zener(3e6, 1e6, 1e5), press, times=3, progress=False)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     again = rv.open_result(rv.save_result(ds, f"{folder}/contact.nc")).load()
+    >>> again.roughvisc.steps.sizes == ds.roughvisc.steps.sizes
+    True
+    """
+    path = path_of(path, "path", "a result (.nc)").expanduser()
+    if path.suffix.lower() != ".nc":
+        raise InputError(key="path", found=str(path), expected="a name that ends in .nc")
+    declared = isinstance(dataset, xr.Dataset) and all(name in VARIABLES for name in dataset.data_vars)
+    if not declared or not set(AXES) & set(dataset.dims) or "case" in dataset.dims:
+        found = list(dataset.sizes) if isinstance(dataset, xr.Dataset) else dataset
+        raise InputError(key="dataset", found=found, expected="a result of one case, as from rv.simulate")
+    if gap_part is not None:
+        dataset = _with_rounded_gap(dataset, number(gap_part, "1", "gap_part", above=0, most=1))
+    return write_result(dataset, path)
+
+
+def _with_rounded_gap(dataset: xr.Dataset, part: float) -> xr.Dataset:
+    """Return a result with the gap of each row as multiples of a power of two below a part of the row's error."""
+    if not {"gap", "approach_error"} <= dataset.variables.keys():
+        expected = "None, since the result lacks a gap or the stated error of the approach"
+        raise InputError(key="gap_part", found=part, expected=expected)
+    error = dataset["approach_error"].values
+    exponents = np.floor(np.log2(2 * part * error, where=error > 0, out=np.full(error.shape, -np.inf)))
+    steps = np.exp2(exponents)[:, None, None]  # rounding is at most half a step; zero: not rounded
+    gap = dataset["gap"]
+    rounded = np.divide(gap.values, steps, where=steps > 0, out=gap.values.copy())
+    rounded = np.where(steps > 0, np.round(rounded) * steps, gap.values)
+    stated = gap.attrs | {"rounding": f"at most {part:g} of approach_error"}
+    found = dataset.assign(gap=(gap.dims, rounded, stated))
+    found.encoding = dataset.encoding
+    return found
 
 
 def _declare(place: netCDF4.Dataset, part: xr.Dataset) -> list[tuple[netCDF4.Variable, xr.Variable]]:
@@ -333,7 +401,7 @@ def _declare(place: netCDF4.Dataset, part: xr.Dataset) -> list[tuple[netCDF4.Var
             encoding["fill_value"] = variable.dtype.type(np.nan)
         if variable.ndim:
             encoding |= {"chunksizes": chunks(variable.shape), "fletcher32": True}
-            if variable.nbytes > _TINY and name not in _DENSE:
+            if variable.nbytes > _TINY and (name not in _DENSE or "rounding" in attributes):
                 encoding |= {"zlib": True, "complevel": 1, "shuffle": name != "pressure"}
         stored = place.createVariable(str(name), variable.dtype, variable.dims, **encoding)
         stored.set_auto_maskandscale(False)

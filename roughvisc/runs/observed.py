@@ -89,7 +89,7 @@ def _add(case: Case, path: Path) -> bool:
         whole = result.drop_vars(set(found.data_vars) & set(result.data_vars)).merge(
             found, compat="equals", join="exact"
         )
-        whole.attrs = result.attrs | {"case": case.to_json(), OBSERVED: json.dumps(known)}
+        whole.attrs = result.attrs | {"case": case.to_json(path.parent), OBSERVED: json.dumps(known)}
         write_result(whole, path)
     log.info("%s: added %s", path, ", ".join(lacking))
     return True

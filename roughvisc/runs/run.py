@@ -68,16 +68,19 @@ def result_folder(case: Case, out: str | Path | None = None) -> Path:
     else:
         folder = Path("results") / (re.sub(r"[^a-z0-9]+", "-", case.title.lower()).strip("-") or "untitled")
     if not (there := existing_part(folder)).is_dir():
-        raise InputError(f"{there}: is a file: expected a folder for the results")
+        key, expected = "out" if out is not None else "", "a folder for the results"
+        text = f"{there}: is a file: expected {expected}"
+        raise InputError(f"{key}: {text}" if key else text, key=key, found=out, expected=expected)
     return folder
 
 
 def compute(
-    case: Case, keeper: CheckpointWriter, *, progress: bool | Progress = True, threads: int | None = None
+    case: Case, keeper: CheckpointWriter, folder: Path, *, progress: bool | Progress = True, threads: int | None = None
 ) -> xr.Dataset:
     """Compute a case and return the result; its attributes contain everything that a second run needs.
 
-    The run continues from the checkpoint of the keeper, which also provides the fields of the result.
+    Paths in the attributes are relative to the folder of the result. The run continues from the checkpoint of the
+    keeper, which also provides the fields of the result.
 
     Raises
     ------
@@ -95,7 +98,7 @@ def compute(
     title = case.title
     for key, value in case.varied.items():
         title += f", {key} = {json.dumps(value)}"
-    now, stated = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"), case.to_json()
+    now, stated = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"), case.to_json(folder)
     ran = f"{now} {program_version()}: run of {case.origin.name if case.origin else 'a case'}"
     provenance = {
         "Conventions": dataset.attrs.pop("Conventions"),
@@ -187,7 +190,8 @@ def _run(
                     log.warning("%s: is damaged: it is renamed to %s and computed again", path, aside.name)
                 keeper.resume()
                 try:
-                    dataset = compute(case, keeper, progress=progress, threads=threads)
+                    case = case.stored(folder)
+                    dataset = compute(case, keeper, folder, progress=progress, threads=threads)
                     write_result(dataset, path)
                     entry = entry_of(path, as_stored(dataset))
                 except RoughviscError as error:

@@ -188,7 +188,8 @@ def run_cases(
     require_writable(folder, "for the results")
     folder.mkdir(parents=True, exist_ok=True)
     clean_folder(folder)
-    listed = sweep_cases(cases)
+    distinct = {key: case.stored(folder) for key, case in distinct.items()}
+    listed = sweep_cases(cases, folder)
     with log_file(folder):
         write_json(folder / SWEEP, listed)
         index, outcomes = index_of(folder), dict[str, Outcome]()

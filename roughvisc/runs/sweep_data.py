@@ -218,9 +218,9 @@ def _read_cache(folder: Path) -> dict[str, Entry]:
     return entries
 
 
-def sweep_cases(cases: Sequence[Case]) -> dict[str, dict[str, Any]]:
-    """Return key -> JSON of each distinct case, in the order of the study."""
-    return {key: json.loads(case.to_json()) for key, case in {case.key: case for case in cases}.items()}
+def sweep_cases(cases: Sequence[Case], folder: Path | None = None) -> dict[str, dict[str, Any]]:
+    """Return key -> JSON of each distinct case, in the order of the study, with paths relative to a folder."""
+    return {key: json.loads(case.to_json(folder)) for key, case in {case.key: case for case in cases}.items()}
 
 
 def read_sweep(folder: Path) -> dict[str, dict[str, Any]]:
@@ -298,7 +298,7 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.
     """
     folder = path_of(out, "out", "a folder of results").absolute()
     index = index_of(folder)
-    listed = read_sweep(folder) if cases is None else sweep_cases(cases)
+    listed = read_sweep(folder) if cases is None else sweep_cases(cases, folder)
     listed = listed or {key: entry.case for key, entry in index.items()}
     here = [place for place, key in enumerate(listed) if key in index]
     if not here:

@@ -2,35 +2,61 @@
 
 from __future__ import annotations
 
-import hashlib
+import builtins
+import dataclasses
+import itertools
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
+import math
+import os
+import re
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, partial
 from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roughvisc.arguments import a_table, located, split
+from roughvisc.arguments import a_table, refuse_unknown, split
 from roughvisc.errors import InputError, RoughviscError, short_repr
 from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
+from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.mechanics.body import Body
-from roughvisc.mechanics.materials.material import Material, ThermalLaw
+from roughvisc.mechanics.materials.material import Creep, Material, Prony, ThermalLaw
+from roughvisc.mechanics.materials.models import creep_series
 from roughvisc.mechanics.program import Program
-from roughvisc.paths import path_of
-from roughvisc.settings import Settings
-from roughvisc.study.case_text import value_text
+from roughvisc.paths import atomic_write, path_of
+from roughvisc.settings import Boundary, Edge, Missing, Numerics, Settings
+from roughvisc.study.case_text import study_text, value_text
+from roughvisc.study.identity import (
+    area_of,
+    body_identity,
+    checksums_of,
+    digest,
+    experiment_identity,
+    settings_identity,
+    surface_identity,
+)
 from roughvisc.study.material_file import with_line
-from roughvisc.study.study_file import in_si, parts_of, shift_factor, unit_of, with_files, without_late_times
-from roughvisc.study.sweep_table import SURROGATE, place, sweep_changes, value_at
-from roughvisc.topography.conditioning import STEPS
-from roughvisc.topography.readers import sha256
-from roughvisc.topography.scans import is_card, measured_file, read_card, read_toml, surface_height
+from roughvisc.study.objects import experiment_of, experiment_table, material_table, surface_table, tables_of
+from roughvisc.study.study_file import (
+    TABLE_OF,
+    TABLES,
+    in_si,
+    parts_of,
+    shift_factor,
+    unit_of,
+    with_files,
+    without_late_times,
+)
+from roughvisc.study.sweep_table import MOST_CASES, SURROGATE, place, sweep_changes, value_at
+from roughvisc.topography.heights import digest_in, file_name, write_heights
+from roughvisc.topography.scans import read_toml, surface_height
 from roughvisc.units import format_quantity
 from roughvisc.version import NUMERICS_REVISION
 
@@ -39,12 +65,36 @@ if TYPE_CHECKING:
 
 __all__ = ["Case", "read_cases", "read_study", "vary"]
 
+#: Keys whose value may be a list, so that only a list of lists contains several values.
+_LISTS = ("program", "fields", "times", "speeds", "shape", "size", "spacing", "resample", "x", "y", "offset")
+_LISTS += ("moduli", "ratios", "compliances", "frequencies", "storage", "loss", "shift_factors", "values")
+#: Arguments of a case that objects of Python state.
+_OBJECTS = ("surface", "material", "program")
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, init=False, repr=False)
 class Case:
-    """One simulation: a surface, a material, a program or a friction curve, and the settings of the solve.
+    """One simulation: a surface, a material, a program or steady sliding, and the settings of the solve.
 
-    :func:`read_study`, :func:`read_cases` and :meth:`from_json` make and check it; :func:`vary` changes it.
+    :func:`read_study` and :func:`read_cases` return cases of a study file; :func:`vary` changes a case. All functions
+    that take a study file take a case.
+
+    Parameters
+    ----------
+    surface : xarray.DataArray, dims (x, y)
+        Heights, as in :func:`roughvisc.simulate`. [m]
+    material : Material or Body
+        Material of a half-space, or a body, as in :func:`roughvisc.simulate`. The case has the series that the run uses
+        in place of a function from :func:`roughvisc.creep`.
+    program : Program or SteadySliding
+        Load, nominal pressure or approach against time, or steady sliding, with its speeds in increasing order.
+    title : str
+        Title of the results. It names the default folder, ``results/`` and the title.
+    boundary, tolerance, times, fields, missing, edge, grid_error, numerics
+        As in :func:`roughvisc.simulate`.
+    observe, audit : mapping, optional
+        The tables of a study file: quantities to add to the result, such as ``{"leakage": {"viscosity": "2 mPa s"}}``,
+        and properties for :func:`roughvisc.audit`.
 
     Attributes
     ----------
@@ -53,7 +103,7 @@ class Case:
     origin : Path or None
         The study file.
     varied : mapping
-        Values that a sweep or :func:`vary` set: dotted key -> value in SI.
+        Values that a sweep or :func:`vary` set: dotted key -> value in SI, or the name of an object.
     late_times : tuple of float
         Times of the study that are not kept, because in this case of its sweep they are after the end of the program.
         [s]
@@ -65,16 +115,89 @@ class Case:
         A loading program or steady sliding.
     settings : Settings
         Settings of the solve, with the boundary that ``auto`` resolves to.
+    heights : xarray.DataArray or None
+        Heights of the file that the surface names, if they come from Python. [m]
+    function : Body or None
+        Body with a creep function, for which the case has a series.
+
+    Raises
+    ------
+    InputError
+        If an argument is invalid, or cannot be stated in a study file: a kernel of your own, and a creep function in a
+        pair or in steady sliding.
+
+    See Also
+    --------
+    roughvisc.run, roughvisc.sweep, roughvisc.plan, roughvisc.trade, roughvisc.budget, roughvisc.audit
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> ball = rv.sphere(radius=1e-3, size=2e-4, shape=45)
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), rv.Program().load(1e-4, over=0).hold(0.5), tolerance=1e-2)
+    >>> case
+    Case 'untitled', sphere on zener; Program: load to 100 µN at once, hold 500 ms
+    >>> case.key == rv.vary(case, {"tolerance": "1 %"}).key
+    True
     """
 
     tables: Mapping[str, Any]
     origin: Path | None
-    varied: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
-    late_times: tuple[float, ...] = field(default=(), kw_only=True, compare=False)
+    varied: Mapping[str, Any]
+    late_times: tuple[float, ...] = field(compare=False)
     title: str = field(compare=False)
     body: Body = field(compare=False)
     experiment: Experiment = field(compare=False)
     settings: Settings = field(compare=False)
+    heights: xr.DataArray | None = field(compare=False)
+    function: Body | None = field(compare=False)
+
+    def __init__(
+        self,
+        surface: xr.DataArray,
+        material: Material | Body,
+        program: Program | SteadySliding,
+        *,
+        title: str = "untitled",
+        boundary: Boundary = Settings.boundary,
+        tolerance: float = Settings.tolerance,
+        times: int | Sequence[float | str] | str | None = Settings.times,
+        fields: Sequence[str] | str = Settings.fields,
+        missing: Missing = Settings.missing,
+        edge: Edge = Settings.edge,
+        grid_error: bool | Literal["auto"] = Settings.grid_error,
+        numerics: Numerics = Numerics(),
+        observe: Mapping[str, Any] | None = None,
+        audit: Mapping[str, Any] | None = None,
+    ) -> None:
+        if not isinstance(numerics, Numerics):
+            raise InputError(key="numerics", found=numerics, expected="rv.Numerics(...)")
+        settings = Settings(
+            boundary=boundary,
+            tolerance=tolerance,
+            times=times,
+            fields=fields,
+            missing=missing,
+            edge=edge,
+            grid_error=grid_error,
+            **vars(numerics),
+        )
+        further = {"title": title, "observe": observe, "audit": audit}
+        tables, heights = tables_of(surface, material, program, settings, **further)
+        try:
+            made = _case_of(tables, None, heights=heights)
+        except InputError as error:
+            raise as_written(error, TABLE_OF) from error
+        function = material if made.tables["material"]["model"] == creep_series.__name__ else None
+        vars(self).update(vars(made.with_fields(function=function)))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state for pickle, without a creep function."""
+        return vars(self) | {"function": None}
+
+    def with_fields(self, **changes: Any) -> Case:
+        """Return the case with other values of some attributes, which are not checked."""
+        return _made({one.name: getattr(self, one.name) for one in dataclasses.fields(self)} | changes)
 
     def __repr__(self) -> str:
         """Return title, surface, material, experiment and varied values in one line."""
@@ -146,24 +269,18 @@ class Case:
     def key(self) -> str:
         """Sixteen hexadecimal digits that identify everything that determines the numbers.
 
-        The key is a digest of the tables in SI, the checksums of the scans, and
-        :data:`roughvisc.version.NUMERICS_REVISION`. The title, the paths, and the tables ``[observe]`` and ``[audit]``
-        do not count.
+        The key is a digest of the checksum of the heights or of the scan with its steps, the series of the body, the
+        segments of the program, the settings, and :data:`roughvisc.version.NUMERICS_REVISION`. It does not depend on
+        how these are written. The title, the paths, and the tables ``[observe]`` and ``[audit]`` do not count.
         """
-        settings: dict[str, Any] = {"fields": sorted(self.settings.fields)}
-        for one in fields(self.settings):
-            if (value := getattr(self.settings, one.name)) != one.default:
-                settings.setdefault(one.name, value)
-        tables = {"material": self.tables["material"]}
-        tables |= {"program": self.tables.get("program"), "friction": self.tables.get("friction")}
-        surface = []
-        for face in filter(None, (self.surface, self.surface.get("second"))):
-            stated = split(face, "file", "second")[1]
-            for name in face:
-                if face[name] is False:  # a step left out
-                    del stated[name]
-            surface.append(stated)
-        return _digest([tables, surface, settings, self.checksums, NUMERICS_REVISION])[:16]
+        stated = [
+            surface_identity(self.surface, self.checksums),
+            body_identity(self.body),
+            experiment_identity(self.experiment, area_of(self.surface)),
+            settings_identity(self.settings),
+            NUMERICS_REVISION,
+        ]
+        return digest(stated)[:16]
 
     def height(self) -> xr.DataArray:
         """Return the conditioned heights of the surface, peaks up. [m]
@@ -181,7 +298,7 @@ class Case:
         try:
             if "shape" in self.surface:
                 require_surface(self.surface["shape"])
-            height = surface_height(self.surface)
+            height = surface_height(self.surface, self.heights)
             is_changed = checksums_of(self.surface) != before
         except InputError as error:
             raise error.prefixed(source) from error
@@ -190,24 +307,102 @@ class Case:
             raise RoughviscError(f"{source}: surface: {changed}: run the study again", transient=True)
         return height
 
-    def to_json(self) -> str:
-        """Return the case as JSON; :meth:`from_json` makes a case with the same key from it."""
+    def to_json(self, folder: Path | None = None) -> str:
+        """Return the case as JSON; :meth:`from_json` makes a case with the same key from it.
+
+        Parameters
+        ----------
+        folder : Path, optional
+            Folder to which the paths of files are relative. Default: the paths are absolute.
+        """
         stated = dict(self.tables)
         if self.varied:
             stated["varied"] = dict(self.varied)
         if self.origin:
             stated["origin"] = str(self.origin.absolute())
-        return json.dumps(stated)
+        return json.dumps(_with_paths(stated, partial(_relative, folder.absolute())) if folder else stated)
 
     @classmethod
-    def from_json(cls, text: str) -> Case:
-        """Make a case from the JSON of :meth:`to_json`, which is also the attribute ``case`` of a result."""
+    def from_json(cls, text: str, folder: Path | None = None) -> Case:
+        """Make a case from the JSON of :meth:`to_json`, which is also the attribute ``case`` of a result.
+
+        Parameters
+        ----------
+        text : str
+            The JSON.
+        folder : Path, optional
+            Folder of relative paths, that of the result.
+        """
         try:
             data = dict(json.loads(text))
         except (TypeError, ValueError, RecursionError) as error:
             raise InputError(f"not a case written by to_json: {error}") from error
+        if folder:
+            data = _with_paths(data, lambda path: os.path.normpath(folder.absolute() / path))
         origin, varied = data.pop("origin", None), data.pop("varied", {})
-        return replace(_case_of(data, origin and Path(origin)), varied=varied)
+        return _case_of(data, origin and Path(origin)).with_fields(varied=varied)
+
+    def stored(self, folder: Path) -> Case:
+        """Return the case with its heights in a file of a folder, which is written unless it exists."""
+        if self.heights is None or Path(self.surface["file"]).is_absolute():
+            return self
+        written = str(write_heights(self.heights, folder))
+        return self.with_fields(tables={**self.tables, "surface": {**self.surface, "file": written}})
+
+    def to_toml(self, path: str | Path) -> Path:
+        """Write the study file of the case; heights from Python are written to a NetCDF file next to it.
+
+        Parameters
+        ----------
+        path : path
+            The study file, such as ``"hold.toml"``. An existing file is replaced.
+
+        Returns
+        -------
+        Path
+            The study file. :func:`read_study` reads a case with the same key from it.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+
+        See Also
+        --------
+        roughvisc.read_study
+        """
+        path = path_of(path, "path", "a study file").expanduser()
+        if path.suffix.lower() != ".toml":
+            raise InputError(key="path", found=str(path), expected="a name that ends in .toml")
+        with atomic_write(path) as temporary:  # checks the folder before the heights are written
+            stated = json.loads(self.stored(path.absolute().parent).to_json(path.parent))
+            temporary.write_text(study_text(stated), encoding="utf-8")
+        return path
+
+
+def _made(values: Mapping[str, Any]) -> Case:
+    """Return the case of the values of its attributes."""
+    case = object.__new__(Case)
+    vars(case).update(values)
+    return case
+
+
+def _with_paths(stated: Any, change: Callable[[str], str], key: str = "") -> Any:
+    """Return tables in which the paths of files are changed."""
+    if isinstance(stated, Mapping):
+        return {name: _with_paths(one, change, name) for name, one in stated.items()}
+    is_path = key == "origin" or key.rpartition(".")[2] == "file"
+    return change(stated) if is_path and isinstance(stated, str) else stated
+
+
+def _relative(folder: Path, path: str) -> str:
+    """Return a path relative to a folder; the name of a file on another drive."""
+    if not os.path.isabs(path):
+        return path
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:
+        return Path(path).name
 
 
 def read_study(path: str | Path) -> Case:
@@ -273,23 +468,26 @@ def read_cases(path: str | Path) -> list[Case]:
         except InputError as error:
             values = ", ".join(f"{key} = {short_repr(value)}" for key, value in {**change, **drawn}.items())
             raise error.prefixed(f"{path}: case {number} ({values})" if values else str(path)) from error
-    if always_late := set.intersection(*(set(case.late_times) for case in cases)):
-        expected = "times up to the end of the longest program"
-        raise InputError(key="keep.times", found=max(always_late), expected=expected).prefixed(str(path))
+    try:
+        _refuse_late(cases, "keep.times")
+    except InputError as error:
+        raise error.prefixed(str(path)) from error
     return cases
 
 
-def case_given(case: Any) -> Case:
+def case_given(case: Any, key: str = "case") -> Case:
     """Return a case, or the case of the study file at a path; refuse anything else."""
     if isinstance(case, Case):
         return case
     if isinstance(case, str | PathLike):
         return read_study(case)
-    raise InputError(key="case", found=case, expected="a Case, such as rv.read_study(...), or the path of a study file")
+    raise InputError(key=key, found=case, expected="a Case, such as rv.read_study(...), or the path of a study file")
 
 
 def cases_given(cases: Any) -> Sequence[Case]:
-    """Return a list of cases, or the cases of the study file at a path; refuse anything else."""
+    """Return a list of cases, a single case as a list, or the cases of a study file; refuse anything else."""
+    if isinstance(cases, Case):
+        return [cases]
     if isinstance(cases, str | PathLike):
         return read_cases(cases)
     if not isinstance(cases, Sequence) or not cases:
@@ -301,32 +499,184 @@ def cases_given(cases: Any) -> Sequence[Case]:
     return cases
 
 
-def vary(case: Case, changes: Mapping[str, Any]) -> Case:
-    """Return a case with some of its values changed.
+def vary(case: Case, changes: Mapping[str, Any], *, zip: bool = False) -> Any:
+    """Return a case with some of its values changed, or the cases of lists of values, as ``[sweep]`` lists them.
 
     Parameters
     ----------
-    case : Case
+    case : Case or path
+        A case, or its study file.
     changes : mapping
-        Dotted key -> value as in a study file: ``{"program.0.load": "2 N", "solve.tolerance": 1e-4}``. None removes a
-        key.
+        Argument of :class:`Case`, or dotted key of a study file -> value, list of values, or dictionary of name ->
+        value: ``{"tolerance": [1e-2, 1e-3], "program": {"ramp": ramp, "hold": hold}, "material.poisson": 0.45}``. A
+        tuple or an array is one value, and so is a list of numbers or texts for a key that takes one, such as
+        ``times``, ``fields`` and ``surface.shape``. None removes a key. Values of ``surface``, ``material`` and
+        ``program`` are objects of Python or tables of a study file. A name is the value of the varied parameter in
+        results.
+    zip : bool
+        Combine the lists entry by entry. Default: their product, the last one varying fastest.
 
     Returns
     -------
-    Case
+    Case or list of Case
+        A list if any value is a list or a dictionary of names. In such a list a case leaves out the times after the end
+        of its own program.
 
     Raises
     ------
     InputError
-        If a key does not exist or a value is refused.
+        If a key does not exist or a value is refused; if a list is empty, names are equal, or the lists for `zip` have
+        different lengths. The key is the argument as in `changes`.
+
+    See Also
+    --------
+    roughvisc.sweep
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> press = rv.Program().load(1e-4, over=0)
+    >>> case = rv.Case(rv.sphere(1e-3, 2e-4, 45), rv.zener(3e6, 1e6, 1e5), press)
+    >>> programs = {"press": press, "hold": press.hold("1 s")}
+    >>> [one.varied for one in rv.vary(case, {"program": programs, "tolerance": 1e-2})]
+    [{'program': 'press', 'tolerance': 0.01}, {'program': 'hold', 'tolerance': 0.01}]
     """
     case = case_given(case)
-    changes = a_table("changes", changes)
+    choices = {key: _choices(key, value) for key, value in a_table("changes", changes).items()}
+    lengths = {key: len(one) for key, one in choices.items() if one is not None}
+    if not lengths:
+        return changed(case, changes)
+    if zip and len(set(lengths.values())) > 1:
+        raise InputError(key="changes", found=lengths, expected="lists of one length")
+    if (count := max(lengths.values()) if zip else math.prod(lengths.values())) > MOST_CASES:
+        raise InputError(key="changes", found=f"{count} cases", expected=f"at most {MOST_CASES}")
+    lists = [one or [("", changes[key])] * (count if zip else 1) for key, one in choices.items()]
+    chosen = builtins.zip(*lists, strict=True) if zip else itertools.product(*lists)
+    cases = []
+    for values in chosen:
+        change = {key: value for key, (_, value) in builtins.zip(choices, values, strict=True)}
+        names = {key: name for key, (name, _) in builtins.zip(choices, values, strict=True) if name}
+        cases.append(changed(case, change, names=names, leaves_out=True))
+    _refuse_late(cases, next(filter(changes.__contains__, ("times", "keep.times")), "times"))
+    return cases
+
+
+def _choices(key: str, value: Any) -> list[tuple[str, Any]] | None:
+    """Return the names and values to choose from; None for a single value."""
+    if isinstance(value, Mapping):
+        parts = list(value.values())
+        of_objects = key in _OBJECTS and all(isinstance(one, Mapping) or _is_object(key, one) for one in parts)
+        if not value or not (of_objects or key.rpartition(".")[2] in TABLE_OF):
+            return None
+        return [(str(name), one) for name, one in value.items()]
+    if not isinstance(value, list):
+        return None
+    several = [isinstance(one, list | tuple) or _is_object(key, one) for one in value]
+    if key.rpartition(".")[2] in _LISTS and not (value and all(several)):
+        return None
+    if not value:
+        raise InputError(key=key, found=value, expected="at least one value; a tuple is one value")
+    names = ["" for _ in value]
+    if key in _OBJECTS and all(_is_object(key, one) for one in value):
+        names = [str(place) if key == "surface" else short_repr(one) for place, one in enumerate(value)]
+        for name, count in Counter(names).items():
+            if count > 1:
+                raise InputError(key=key, found=name, expected=f"different names, not {count} equal ones: a dictionary")
+    return list(builtins.zip(names, value, strict=True))
+
+
+def _is_object(key: str, value: Any) -> bool:
+    """Return whether a value of a changed argument is an object of Python."""
+    return key in _OBJECTS and not isinstance(value, Mapping | str | list | tuple | None)
+
+
+def changed(
+    case: Case,
+    changes: Mapping[str, Any],
+    *,
+    names: Mapping[str, str] = MappingProxyType({}),
+    leaves_out: bool = False,
+) -> Case:
+    """Return a case with some values changed; a list is one value here.
+
+    Parameters
+    ----------
+    case, changes
+        As in :func:`vary`.
+    names : mapping
+        Argument -> name of its value.
+    leaves_out : bool
+        Whether to leave out times after the end of a changed program, instead of refusing them.
+    """
+    heights, function = case.heights, case.function
+    placed: dict[str, Any] = {}
+    written: dict[str, str] = {}
+    refuse_unknown("", {key: value for key, value in changes.items() if "." not in key}, (*TABLES, *TABLE_OF))
+    for key, value in changes.items():
+        if key == "surface" and _is_object(key, value):
+            placed["surface"], heights = surface_table(value)
+        elif key == "program" and _is_object(key, value):
+            placed |= {"program": None, "friction": None} | experiment_table(experiment_of(value))
+        elif key == "material" and _is_object(key, value):
+            function = Body(value) if isinstance(value, Prony | Creep) else value
+        else:
+            dotted_key = f"{TABLE_OF[key]}.{key}" if key in TABLE_OF else key
+            function = None if dotted_key.partition(".")[0] == "material" else function
+            placed[dotted_key] = _plain_value(value)
+            written[dotted_key] = key
+    folder = case.origin and case.origin.parent
     try:
-        changed = _case_of(case.tables, case.origin, case.origin and case.origin.parent, changes)
+        found = _case_of(case.tables, case.origin, folder, placed, leaves_out=leaves_out, heights=heights)
+        if function is not None:
+            table = material_table(function, found.experiment, found.settings)
+            late = found.late_times
+            found = _case_of(found.tables, case.origin, folder, {"material": table}, heights=heights)
+            is_series = table["model"] == creep_series.__name__
+            found = found.with_fields(late_times=late, function=function if is_series else None)
     except InputError as error:
-        raise error.prefixed(str(case.origin or "case")) from error
-    return replace(changed, varied={**case.varied, **changed.varied})
+        stated = as_written(error, {key: key.rpartition(".")[0] for key, own in written.items() if own != key})
+        raise (stated.prefixed(str(case.origin)) if case.origin else stated) from error
+    varied = {}
+    for key in changes:
+        stated = f"{TABLE_OF[key]}.{key}" if key in TABLE_OF else key
+        varied[key] = names.get(key) or value_at(found.tables, stated, changes[key])
+        if _is_object(key, changes[key]):
+            varied[key] = names.get(key) or short_repr(changes[key])
+    return found.with_fields(varied={**case.varied, **varied})
+
+
+def _plain_value(value: Any) -> Any:
+    """Return a value as a study file states it."""
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return list(value) if isinstance(value, tuple) else value
+
+
+def _refuse_late(cases: Sequence[Case], key: str) -> None:
+    """Refuse a kept time after the end of every program."""
+    if always_late := set.intersection(*(set(case.late_times) for case in cases)):
+        expected = "times up to the end of the longest program"
+        raise InputError(key=key, found=max(always_late), expected=expected)
+
+
+def as_written(error: InputError, tables: Mapping[str, str]) -> InputError:
+    """Return an error about a key of a table as an error about the argument that the caller wrote.
+
+    Parameters
+    ----------
+    error : InputError
+        The error.
+    tables : mapping
+        Last part of a key, or the whole key -> table, which the caller has not written.
+    """
+    table, _, rest = error.key.partition(".")
+    name = re.split(r"[.\[]", rest)[0]
+    if table not in (tables.get(name), tables.get(f"{table}.{name}")) or not rest:
+        return error
+    message = str(error)
+    at = message.find(error.key)
+    message = message[:at] + message[at + len(table) + 1 :] if at >= 0 else f"{rest}: {message}"
+    return type(error)(message, key=rest, found=error.found, expected=error.expected, transient=error.transient)
 
 
 def _case_of(
@@ -337,6 +687,7 @@ def _case_of(
     drawn: Mapping[str, int] = MappingProxyType({}),
     *,
     leaves_out: bool = False,
+    heights: xr.DataArray | None = None,
 ) -> Case:
     """Return the checked case of the tables of a study after changes.
 
@@ -354,15 +705,29 @@ def _case_of(
         Number of the realisation, if the case is one.
     leaves_out : bool
         Whether to leave out times after the end of a changed program, instead of refusing them.
+    heights : xarray.DataArray, optional
+        Heights of the file that the surface names, which need not exist. [m]
     """
     for key, value in changes.items():
         data = place(data, key, value)
+    named, surface = split(a_table("surface", data.get("surface", {})), "file")
+    if heights is None or digest_in(named.get("file", "")) != digest_in(file_name(heights)):
+        named, surface, heights = {}, data.get("surface"), None
     try:
-        tables = with_files(data, folder)
+        tables = with_files({**data, "surface": surface} if heights is not None else data, folder)
+        tables["surface"] |= named
         late: tuple[float, ...] = ()
         if leaves_out and any(key.partition(".")[0] == "program" for key in changes):
             tables, late = without_late_times(tables)
-        case = Case(tables, origin, late_times=late, **parts_of(tables))
+        about = {
+            "tables": tables,
+            "origin": origin,
+            "varied": {},
+            "late_times": late,
+            "heights": heights,
+            "function": None,
+        }
+        case = _made(about | parts_of(tables))
     except InputError as error:
         named = error
         for key in (error.key, error.key.rpartition(".")[0]):
@@ -379,39 +744,7 @@ def _case_of(
     for key, value in changes.items():
         if not drawn or key != SURROGATE:
             varied[key] = value_at(tables, key, value)
-    return replace(case, varied=varied | drawn)
-
-
-def checksums_of(surface: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return checksums of the scan or recipe of each face and of its surface card, without the origin of the card."""
-    found = []
-    for face in filter(None, (surface, surface.get("second"))):
-        if "file" not in face:
-            found.append((_digest(split(face, "second", "missing", "flip", "offset", *STEPS)[1]), ""))
-            continue
-        path = Path(face["file"])
-        card = split(read_card(path)[1], "file")[1] if is_card(path) else {}
-        scan = measured_file(path)
-        try:
-            found.append((_digest(card) if scan is None else sha256(scan), _digest(card) if card else ""))
-        except InputError as error:
-            raise located(error, "surface.file") from error
-    return found
-
-
-def _digest(stated: Any) -> str:
-    """Return the SHA-256 of nested values, with numbers rounded to 15 significant digits and without notes."""
-
-    def rounded(number: str) -> str:
-        return f"{float(number) + 0.0:.15g}"  # of -0.0 and 0.0 the same
-
-    def without_note(table: dict[str, Any]) -> dict[str, Any]:
-        table.pop("note", None)
-        return table
-
-    text, numbers = json.dumps(stated), dict.fromkeys(("parse_int", "parse_float", "parse_constant"), rounded)
-    plain = json.loads(text, object_hook=without_note, **numbers)
-    return hashlib.sha256(json.dumps(plain, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+    return case.with_fields(varied=varied | drawn)
 
 
 # -------------------------------------------------------------------------------------- varied parameters

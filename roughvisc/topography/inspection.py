@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -88,7 +89,7 @@ class Inspection:
     rms_slope: float
 
 
-def inspect(h: xr.DataArray) -> Inspection:
+def inspect(h: xr.DataArray) -> xr.Dataset:
     """Inspect a scan and recommend conditioning steps, as ``roughvisc scan`` prints them.
 
     Parameters
@@ -98,23 +99,44 @@ def inspect(h: xr.DataArray) -> Inspection:
 
     Returns
     -------
-    Inspection
-        Findings, each with its numbers and the advice that follows, and the steps together.
+    xarray.Dataset
+        Over ``property``: ``finding``, in words; ``advice``, empty if nothing has to be done; ``step``, the
+        conditioning step that follows, as JSON. Scalars: ``area`` [m2] and ``rms_slope`` [-] after the steps.
+        Attributes: ``steps``, all steps as JSON, and ``boundary``, without a step between a surface and its repetition.
 
     Raises
     ------
     InputError
         If all points are missing, or the points present do not determine a plane.
 
+    See Also
+    --------
+    roughvisc.parameters, roughvisc.level
+
     Examples
     --------
     >>> import roughvisc as rv
     >>> found = rv.inspect(rv.open_scan(rv.example_scan()))
-    >>> found.steps
-    {'level': 1, 'filter': 2.2e-06}
-    >>> found.findings["Missing points"].seen
+    >>> found.attrs["steps"]
+    '{"level": 1, "filter": 2.2e-06}'
+    >>> found.finding.sel(property="Missing points").item()
     '0 (0 %)'
     """
+    found = inspection_of(h)
+    columns = {
+        "finding": [one.seen for one in found.findings.values()],
+        "advice": [one.advice for one in found.findings.values()],
+        "step": [json.dumps(one.step) if one.step else "" for one in found.findings.values()],
+    }
+    variables: dict[str, Any] = {name: ("property", values) for name, values in columns.items()}
+    variables["area"] = ((), found.area, {"units": "m^2", "long_name": "area after the steps"})
+    variables["rms_slope"] = ((), found.rms_slope, {"units": "1", "long_name": "rms slope after the steps"})
+    attributes = {"steps": json.dumps(found.steps), "boundary": found.boundary}
+    return xr.Dataset(variables, {"property": list(found.findings)}, attributes)
+
+
+def inspection_of(h: xr.DataArray) -> Inspection:
+    """Return the findings in a scan; see :func:`inspect`."""
     h = checked(h, "inspect")
     findings: dict[str, Finding] = {}
     missing, holes = int(h.isnull().sum()), in_large_holes(np.isnan(h.values))

@@ -239,7 +239,7 @@ def self_affine(
     shape = cells(shape, least=2)
     stretch = (math.sqrt(anisotropy), 1 / math.sqrt(anisotropy))
     sides = size[0] / shape[0], size[1] / shape[1]
-    finest = 2 * max(sides[0] / stretch[0], sides[1] / stretch[1])
+    finest = finest_wave(size, shape, anisotropy)
     shortcut = number(finest if shortcut is None else shortcut, "m", "shortcut", least=finest * (1 - 1e-12))
     if rolloff is not None:
         rolloff = number(rolloff, "m", "rolloff", least=shortcut)
@@ -337,6 +337,12 @@ def from_spectrum(
     stated: dict[str, Any] = {"wavevectors": list(map(float, wavevectors)), "densities": list(map(float, densities))}
     stated |= {"convention": convention, "amplitudes": amplitudes, "seed": stated_seed}
     return generated(heights, "spectrum", stated, size, period=list(size))
+
+
+def finest_wave(size: tuple[float, float], shape: tuple[int, int], anisotropy: float = 1.0) -> float:
+    """Return the shortest wavelength of self-affine roughness that a grid resolves: two cells. [m]"""
+    stretch = math.sqrt(anisotropy)
+    return 2 * max(size[0] / shape[0] / stretch, size[1] / shape[1] / (1 / stretch))
 
 
 # ------------------------------------------------------------------------------------------------------------ indenters

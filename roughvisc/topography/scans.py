@@ -37,6 +37,7 @@ from roughvisc.topography.conditioning import FACE_STEPS, STEPS, boundary_after,
 from roughvisc.topography.framing import combine
 from roughvisc.topography.grid import checked
 from roughvisc.topography.grid import spacing as cell_sides
+from roughvisc.topography.heights import digest_in, read_heights
 from roughvisc.topography.readers import existing, read_file, sha256
 from roughvisc.topography.recipes import BOUNDARIES, RECIPES, check_recipe
 from roughvisc.units import Quantity, quantities, unit_for
@@ -243,9 +244,17 @@ def _forgotten_quotes(content: bytes, message: str) -> str:
     return ""
 
 
-def surface_height(table: Mapping[str, Any]) -> xr.DataArray:
-    """Return the conditioned heights of a table ``[surface]``; for two faces, their sum. [m]"""
-    height = _face_height("surface", table)
+def surface_height(table: Mapping[str, Any], given: xr.DataArray | None = None) -> xr.DataArray:
+    """Return the conditioned heights of a table ``[surface]``; for two faces, their sum. [m]
+
+    Parameters
+    ----------
+    table : mapping
+        The table.
+    given : xarray.DataArray, optional
+        Heights of the file that the table names, if they need not be read. [m]
+    """
+    height = _face_height("surface", table, given)
     if "second" in table:
         placing, face = split(table["second"], "flip", "offset")
         flip = placing.pop("flip", "x")
@@ -256,7 +265,8 @@ def surface_height(table: Mapping[str, Any]) -> xr.DataArray:
     if isinstance(steps.get("realisation"), int):
         # with a common seed, the first surrogates of all scans would deviate from their mean in the same direction
         scan = measured_file(Path(table["file"])) if "file" in table else None
-        steps["realisation"] = {"number": steps["realisation"], "seed": int(sha256(scan)[:8], 16) if scan else 0}
+        known = (digest_in(scan.name) or sha256(scan))[:8] if scan else "0"
+        steps["realisation"] = {"number": steps["realisation"], "seed": int(known, 16)}
     return condition(height, steps, "surface")
 
 
@@ -267,11 +277,13 @@ def raw_height(where: str, table: Mapping[str, Any]) -> xr.DataArray:
     if recipe:
         return call(RECIPES[one_of(dotted(where, "generate"), recipe["generate"], RECIPES)], where, arguments)
     file, options = split(source, "file")
+    if digest_in(file["file"]):
+        return read_heights(Path(file["file"]))
     return call(open_scan, where, options, file["file"])
 
 
-def _face_height(where: str, table: Mapping[str, Any]) -> xr.DataArray:
-    return condition(raw_height(where, table), split(table, *FACE_STEPS)[0], where)
+def _face_height(where: str, table: Mapping[str, Any], given: xr.DataArray | None = None) -> xr.DataArray:
+    return condition(raw_height(where, table) if given is None else given, split(table, *FACE_STEPS)[0], where)
 
 
 def check_surface(table: Mapping[str, Any], where: str = "surface") -> None:

@@ -10,10 +10,11 @@ from support import BALL, refused
 
 import roughvisc as rv
 from roughvisc import closed_forms as cf
-from roughvisc.judge.audit import LIMITS, VERDICTS, Finding
+from roughvisc.judge.audit import LIMITS, VERDICTS, Finding, audit_of
 from roughvisc.runs.netcdf import open_result
 from roughvisc.runs.run import run_case
 from roughvisc.study.case import read_study
+from roughvisc.topography.inspection import inspection_of
 
 RADIUS, MODULUS, LOAD = 1e-2, 4e6, 5e-3
 #: Radius and modulus make E* = 2 G / (1 - nu) = 4 MPa.
@@ -80,9 +81,9 @@ def test_adhesion__of_a_sphere_is_its_pull_off_force_by_jkr(ball):
     cap = rv.simulate(rv.sphere(RADIUS, 5e-4, 26), RUBBER, rv.Program().load(LOAD, over=1.0), **QUICK)
     assert cap.contact_fraction[-1] > 0.5
     for ds in (ball, cap):
-        found = rv.audit(ds, work_of_adhesion=2e-4)["adhesion"]
+        found = audit_of(ds, work_of_adhesion=2e-4)["adhesion"]
         assert found.number == pytest.approx(1.5 * math.pi * 2e-4 * RADIUS / LOAD, rel=1e-3)
-    assert rv.audit(ball)["adhesion"].verdict == "not known"
+    assert audit_of(ball)["adhesion"].verdict == "not known"
 
 
 def test_adhesion__of_waves_is_that_of_their_crests_until_these_merge():
@@ -93,7 +94,7 @@ def test_adhesion__of_waves_is_that_of_their_crests_until_these_merge():
     curvature = 2e-6 * (2 * math.pi / 1e-3) ** 2
     numbers = {}
     for row in range(1, 20):
-        number = rv.audit(ds.isel(time=slice(row + 1)), work_of_adhesion=1e-3)["adhesion"].number
+        number = audit_of(ds.isel(time=slice(row + 1)), work_of_adhesion=1e-3)["adhesion"].number
         numbers[float(ds.contact_fraction[row])] = (
             number * float(ds.force[row]) / (2 * 1.5 * math.pi * 1e-3 / curvature)
         )
@@ -115,9 +116,9 @@ def test_thickness__predicts_the_approach_on_the_sheet(poisson, base, width):
     heights, material = rv.sphere(RADIUS, 5.2e-4, 26), rv.elastic(1e6, poisson)
     half_space = rv.simulate(heights, material, program, **QUICK)
     sheet = rv.simulate(heights, rv.sheet(material, a / width, base), program, **QUICK)
-    found = rv.audit(half_space, thickness=a / width, base=base)["thickness"]
+    found = audit_of(half_space, thickness=a / width, base=base)["thickness"]
     assert found.number == pytest.approx(1 - float(sheet.approach[-1] / half_space.approach[-1]), rel=0.25)
-    assert rv.audit(sheet)["thickness"].verdict == "holds"
+    assert audit_of(sheet)["thickness"].verdict == "holds"
 
 
 @pytest.mark.parametrize("thickness", [3e-4, 1e-4])
@@ -129,7 +130,7 @@ def test_thickness__predicts_the_approach_of_a_rough_surface(thickness):
         for body in (RUBBER, rv.sheet(RUBBER, thickness))
     )
     true = 1 - float(sheet.approach[-1] / half_space.approach[-1])  # incompressible: no compression of its own
-    assert 0.5 * true < rv.audit(half_space, thickness=thickness)["thickness"].number < 2 * true
+    assert 0.5 * true < audit_of(half_space, thickness=thickness)["thickness"].number < 2 * true
 
 
 def test_yielding__is_by_the_largest_pressure_of_all_times(ball):
@@ -138,21 +139,21 @@ def test_yielding__is_by_the_largest_pressure_of_all_times(ball):
     creeping = rv.simulate(rv.sphere(RADIUS, 8e-4, (33, 30)), rubber, program, **QUICK)
     for ds, modulus in ((ball, MODULUS), (creeping, 12e6)):
         peak = cf.hertz(RADIUS, modulus, LOAD).peak_pressure
-        assert rv.audit(ds, yield_strength=peak)["yielding"].number == pytest.approx(1.0, rel=5e-3)
+        assert audit_of(ds, yield_strength=peak)["yielding"].number == pytest.approx(1.0, rel=5e-3)
 
 
 def test_slope__of_a_sphere_is_the_contact_radius_over_its_own(ball):
     a = cf.hertz(RADIUS, MODULUS, LOAD).radius
-    assert rv.audit(ball)["slope"].number == pytest.approx(a / RADIUS, rel=0.06)
+    assert audit_of(ball)["slope"].number == pytest.approx(a / RADIUS, rel=0.06)
 
 
 def test_inertia__is_by_waves_over_the_program(ball):
     a = cf.hertz(RADIUS, MODULUS, LOAD).radius
-    found = rv.audit(ball, density="1000 kg/m^3")["inertia"]
+    found = audit_of(ball, density="1000 kg/m^3")["inertia"]
     assert found.number == pytest.approx(0.85 * a * math.sqrt(1000 / 1e6) / 1.0, rel=0.1)  # by cells
     fast = rv.simulate(rv.sphere(RADIUS, 8e-4, 24), RUBBER, rv.Program().load(LOAD, over=2e-6), **QUICK)
-    assert rv.audit(fast)["inertia"].verdict == "not known"
-    assert rv.audit(fast, density=1000)["inertia"].verdict == "broken"
+    assert audit_of(fast)["inertia"].verdict == "not known"
+    assert audit_of(fast, density=1000)["inertia"].verdict == "broken"
 
 
 @pytest.mark.parametrize(
@@ -204,7 +205,7 @@ def moving_compliance(speed, shear, density, poisson):
 def test_inertia__of_a_slide_is_by_its_speed_over_that_of_waves():
     density = 1100.0
     wave = math.sqrt(SHEAR / density)
-    found = {part: rv.audit(rubbed(part * wave), density=density)["inertia"] for part in (0.1, 0.5, 0.85, 1.01)}
+    found = {part: audit_of(rubbed(part * wave), density=density)["inertia"] for part in (0.1, 0.5, 0.85, 1.01)}
     assert [one.verdict for one in found.values()] == ["holds", "doubtful", "broken", "broken"]
     still, moving = (moving_compliance(part * wave, SHEAR, density, 0.499) for part in (1e-3, 0.5))
     assert 1 < found[0.5].number / (moving / still - 1) < 1.4
@@ -228,8 +229,8 @@ def test_heating__is_that_of_the_friction_power_in_the_spots(conductivity):
     radius = math.sqrt(area / math.pi)
     exact = force * 0.5 / area * radius / conductivity * exact_flash(0.5 * radius * capacity / conductivity)
     given = {"heat_conductivity": conductivity, "volumetric_heat_capacity": "1.8 MJ/m^3/K"}
-    assert 0.96 * exact < rv.audit(ds, **given)["heating"].number <= 1.001 * exact
-    assert rv.audit(ds, heat_conductivity=0.2)["heating"].verdict == "not known"
+    assert 0.96 * exact < audit_of(ds, **given)["heating"].number <= 1.001 * exact
+    assert audit_of(ds, heat_conductivity=0.2)["heating"].verdict == "not known"
 
 
 def test_friction_curve__is_judged_by_its_speeds():
@@ -242,12 +243,12 @@ def test_friction_curve__is_judged_by_its_speeds():
         for speeds in ([1e-3, 3.0], [1e-3, 3.0, 100.0])
     )
     assert slow.contact_area[0] > 2 * slow.contact_area[1]
-    assert [rv.audit(ds, **given)["inertia"].verdict for ds in (slow, fast)] == ["holds", "broken"]
+    assert [audit_of(ds, **given)["inertia"].verdict for ds in (slow, fast)] == ["holds", "broken"]
     powers = slow.friction_force * slow.speed
     row, power = slow.isel(speed=int(powers.values.argmax())), float(powers.max())
     radius = math.sqrt(float(row.contact_area) / math.pi)  # of one crest, one spot
     rise = power / float(row.contact_area) * radius / 0.2 * exact_flash(3.0 * radius * 2e6 / 0.2)
-    assert rv.audit(slow, **given)["heating"].number == pytest.approx(rise, rel=0.04)
+    assert audit_of(slow, **given)["heating"].number == pytest.approx(rise, rel=0.04)
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -269,7 +270,7 @@ def generated(shortcut, shape=(48, 40), **settings):
 
 def test_resolution__is_what_the_last_octave_adds_to_the_slope(rough):
     """Of heights that no recipe states."""
-    found = rv.audit(rough.assign(height=rough.height.assign_attrs(recipe="")))["resolution"]
+    found = audit_of(rough.assign(height=rough.height.assign_attrs(recipe="")))["resolution"]
     q = 2 * np.pi * np.hypot(np.fft.fftfreq(40, 2.5e-5)[:, None], np.fft.fftfreq(36, 2.5e-5))
     squares = q**2 * np.abs(np.fft.fft2(rough.height.values)) ** 2
     order = np.argsort(q, axis=None)
@@ -281,7 +282,7 @@ def test_resolution__is_what_the_last_octave_adds_to_the_slope(rough):
 def test_resolution__of_a_measured_ball_is_that_of_its_form(ball):
     measured = rv.from_array(ball.height.values, spacing=2.5e-5)
     ds = rv.simulate(measured, RUBBER, rv.Program().load(1e-3, over=1.0), boundary="free", **QUICK)
-    assert rv.audit(ds)["resolution"].verdict == "holds"
+    assert audit_of(ds)["resolution"].verdict == "holds"
 
 
 @pytest.mark.parametrize("sides", [(5e-7, 5e-7), (5e-7, 2e-6), (2e-6, 5e-7)])
@@ -295,13 +296,13 @@ def test_resolution__of_a_regular_texture_holds_with_and_without_the_filter_that
     def verdict(heights, cutoff=None):
         surface = rv.from_array(1e-6 * heights, sides)
         surface = rv.gaussian_filter(surface, cutoff) if cutoff else surface
-        return rv.audit(pressed(surface, "mirror"))["resolution"].verdict
+        return audit_of(pressed(surface, "mirror"))["resolution"].verdict
 
     for heights in (texture, np.outer(along_x, np.ones(y.size)), texture + np.add.outer(x, y) / (100 * longest)):
         for cells in (10, 15):
             assert verdict(heights, cells * longest) == "holds"
     noisy = texture + 0.04 * noise
-    recommended = rv.inspect(rv.from_array(1e-6 * noisy, sides)).steps["filter"]
+    recommended = inspection_of(rv.from_array(1e-6 * noisy, sides)).steps["filter"]
     assert verdict(noisy, recommended) == "holds"
     cut = rv.without_short_waves(rv.from_array(noise, sides), 8 * longest).values  # of equal power up to a limit
     for rough in (noise, noise + texture, cut):
@@ -314,15 +315,15 @@ def test_resolution__of_heights_that_are_no_longer_the_recipe_s_is_by_the_last_o
     noise = 1e-7 * np.random.default_rng(1).standard_normal(surface.shape)
     for other in (surface.copy(data=surface.values + noise), surface.isel(x=slice(0, 31))):
         assert "recipe" in other.attrs
-        assert rv.audit(pressed(other))["resolution"].number > 0.01
-    assert rv.audit(pressed(surface))["resolution"].number == 0
+        assert audit_of(pressed(other))["resolution"].number > 0.01
+    assert audit_of(pressed(surface))["resolution"].number == 0
 
 
 def test_border__is_broken_by_a_tilt_and_mended_by_mirror_images(rough):
-    assert rv.audit(rough)["border"].verdict == "holds"
+    assert audit_of(rough)["border"].verdict == "holds"
     heights, program = rough.height + 2e-5 * rough.x / 1e-3, rv.Program().pressure(2e4, over=1.0)
     tilted, mirrored, unfolded = (
-        rv.audit(rv.simulate(one, RUBBER, program, boundary=boundary, **QUICK))["border"]
+        audit_of(rv.simulate(one, RUBBER, program, boundary=boundary, **QUICK))["border"]
         for one, boundary in ((heights, "periodic"), (heights, "mirror"), (rv.mirror(heights), "periodic"))
     )
     assert tilted.verdict in ("doubtful", "broken")
@@ -335,15 +336,15 @@ def test_border__is_broken_by_a_tilt_and_mended_by_mirror_images(rough):
 
 def test_rows__are_of_the_assumptions_that_the_scene_makes(ball, rough):
     usual = [name for name in LIMITS if name != "heating"]
-    assert [one.name for one in rv.audit(rough)] == usual
-    assert [one.name for one in rv.audit(ball)] == [name for name in usual if name != "border"]
+    assert [one.name for one in audit_of(rough)] == usual
+    assert [one.name for one in audit_of(ball)] == [name for name in usual if name != "border"]
 
 
 def test_audit__without_fields_or_contact_knows_less(rough):
-    found = rv.audit(rough.drop_vars(["pressure", "gap"]), work_of_adhesion=0.05, yield_strength=1e7, thickness=1e-3)
+    found = audit_of(rough.drop_vars(["pressure", "gap"]), work_of_adhesion=0.05, yield_strength=1e7, thickness=1e-3)
     assert {found[name].verdict for name in ("adhesion", "yielding", "thickness")} == {"not known"}
     apart = rv.simulate(rv.sphere(RADIUS, 4e-4, 16), RUBBER, rv.Program().approach(-1e-6, over=1.0), **QUICK)
-    found = rv.audit(apart, work_of_adhesion=0.05, yield_strength=1e6, thickness=1e-3, density=1000)
+    found = audit_of(apart, work_of_adhesion=0.05, yield_strength=1e6, thickness=1e-3, density=1000)
     assert {found[name].verdict for name in ("adhesion", "yielding", "thickness", "inertia")} == {"not known"}
 
 
@@ -360,7 +361,7 @@ def test_audit__without_fields_or_contact_knows_less(rough):
 )
 def test_audit__refuses_a_wrong_value(ball, given, key):
     with refused(key):
-        rv.audit(ball, **given)
+        audit_of(ball, **given)
 
 
 def test_audit__refuses_what_is_no_result_of_one_case(ball):
@@ -370,7 +371,7 @@ def test_audit__refuses_what_is_no_result_of_one_case(ball):
         (ball.drop_vars("force"), "'force'"),
     ):
         with pytest.raises(rv.InputError, match=named):
-            rv.audit(wrong)
+            audit_of(wrong)
 
 
 AUDITED = BALL + '[audit]\nwork_of_adhesion = "50 mJ/m^2"\nthickness = "0.6 mm"\n'
@@ -384,7 +385,7 @@ def test_study__states_values_that_change_no_key(tmp_path, invoke):
         keys.add(read_study(path).key)
     assert len(keys) == 1
     with open_result(run_case(read_study(path), tmp_path / "results")) as ds:
-        stated, given = (rv.audit(ds, **more)["thickness"].number for more in ({}, {"thickness": "3 mm"}))
+        stated, given = (audit_of(ds, **more)["thickness"].number for more in ({}, {"thickness": "3 mm"}))
     assert given < stated
     out = invoke("audit", tmp_path / "results")[1]
     assert "600 µm" in out

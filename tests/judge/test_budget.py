@@ -83,7 +83,7 @@ def test_time_scale__of_a_fluid_under_a_ball(tmp_path):
 def test_grid__holds_the_change_to_cells_half_as_long_and_not_much_more(tmp_path):
     """Long cells lose short waves, which is no error of the short cells."""
     study = case(ROUGH, tmp_path)
-    fine = rv.run(rv.vary(study, {"surface.resample": [108, 100]}), out=tmp_path / "fine", progress=False)
+    fine = rv.run(rv.vary(study, {"surface.resample": (108, 100)}), out=tmp_path / "fine", progress=False)
     over = []
     for name, found in stated(study, tmp_path, ["contact_area", "mean_gap"]).items():
         over.append(found["half_width"].sel(source="grid") / np.abs(np.log(fine[name] / found["value"])))
@@ -114,7 +114,7 @@ def test_missing_waves__count_on_one_side(tmp_path):
 def test_interval__holds_the_waves_that_a_finer_grid_shows(tmp_path):
     """The same surface with its waves down to the cut-off, on a grid that holds them."""
     fine = case(ROUGH, tmp_path, **{"surface.shape": [216, 200], "surface.shortcut": "18.6 um"})
-    scan = rv.vary(fine, {"surface.resample": [54, 50]})
+    scan = rv.vary(fine, {"surface.resample": (54, 50)})
     true = rv.run(fine, out=tmp_path / "true", progress=False)
     for name in ("contact_area", "mean_gap"):
         found = stated(scan, tmp_path, name, cutoff="18.6 um", modulus_error=0.0, time_scale_error=0.0)
@@ -130,7 +130,7 @@ def test_sample__is_the_scatter_of_other_patches(tmp_path):
     assert "sample" not in patch["source"]
     gaps = []
     for seed in range(20, 32):
-        other = rv.vary(study, {"surface.seed": seed, "surface.resample": [27, 25]})
+        other = rv.vary(study, {"surface.seed": seed, "surface.resample": (27, 25)})
         gaps.append(rv.run(other, out=tmp_path / "others", progress=False)["mean_gap"].values[-1])
     scatter = np.std(np.log(gaps), ddof=1)
     assert 0.3 < width(ensemble, "sample") / (3.3 * scatter) < 3  # 6 and 12 draws

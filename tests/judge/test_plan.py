@@ -181,7 +181,7 @@ def test_contact_at_the_border__is_foreseen_where_it_ends_the_run(study):
 
 def test_plan__refuses_with_a_reason(study, monkeypatch):
     case = study(SPHERE)
-    beyond = vary(case, {"solve.boundary": "periodic", "program": [{"approach": "1 mm", "over": 1}]})
+    beyond = vary(case, {"solve.boundary": "periodic", "program": ({"approach": "1 mm", "over": 1},)})
     planned = rv.plan([case, beyond], workers=2)
     assert list(planned.refusal.values != "") == [False, True]
     assert np.isnan(planned.wall_time[1])

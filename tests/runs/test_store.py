@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from sample_results import hertz_creep, rough_creep
-from support import assert_missing_as_declared
+from support import assert_missing_as_declared, refused
 
 import roughvisc as rv
 from roughvisc.experiment.base import Row
@@ -78,3 +78,22 @@ def test_write_result__holds_one_layer_of_chunks(tmp_path):
     assert largest < 1.5 * ds["pressure"].nbytes / 3
     with open_result(path) as read:
         np.testing.assert_array_equal(read["pressure"][:, 3, 5], np.arange(24.0))
+
+
+def test_save_result__keeps_values_and_steps_and_rounds_the_gap_to_its_error(tmp_path):
+    waves, press = rv.wavy("1 um", "1 mm", "1 mm", 48), rv.Program().load("2 N", over="0.1 s").hold("1 s")
+    ds = rv.simulate(waves, rv.zener(3e6, 1e6, 1e5), press, times=9, tolerance=1e-2, progress=False)
+    whole = rv.open_result(rv.save_result(ds, tmp_path / "whole.nc"))
+    xr.testing.assert_equal(whole.load(), ds)
+    xr.testing.assert_equal(whole.roughvisc.steps, ds.roughvisc.steps)
+    rounded = rv.open_result(rv.save_result(ds, tmp_path / "rounded.nc", gap_part=0.1))
+    assert (abs(rounded.gap - ds.gap).max(("x", "y")) <= 0.1 * ds.approach_error).all()
+    assert (tmp_path / "rounded.nc").stat().st_size < (tmp_path / "whole.nc").stat().st_size
+    for key, call in {
+        "dataset": lambda: rv.save_result(xr.Dataset({"a": 1}), tmp_path / "no.nc"),
+        "path": lambda: rv.save_result(ds, tmp_path / "no.txt"),
+        "gap_part": lambda: rv.save_result(ds.drop_vars("gap"), tmp_path / "no.nc", gap_part=0.1),
+    }.items():
+        with refused(key):
+            call()
+    assert not list(tmp_path.glob("no.*"))

@@ -8,6 +8,7 @@ import xarray as xr
 import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.topography.grid import checked, spacing
+from roughvisc.topography.inspection import inspection_of
 
 UNITS = pint.UnitRegistry()
 H = rv.self_affine((24e-6, 27e-6), (12, 9), hurst=0.8, rms_slope=0.1, seed=4)
@@ -155,7 +156,7 @@ def test_door__gives_the_transpose_of_the_transpose(shape, cells):
         else:
             for name, values in expected.items():
                 np.testing.assert_allclose(found[name], values, rtol=1e-9, atol=1e-30, err_msg=f"{door}: {name}")
-    found, expected = rv.inspect(turned(h)), rv.inspect(h)
+    found, expected = inspection_of(turned(h)), inspection_of(h)
     assert (found.steps, found.boundary) == (expected.steps, expected.boundary)
     assert found.rms_slope == pytest.approx(expected.rms_slope, rel=1e-9)
     assert found.area == pytest.approx(expected.area, rel=1e-12)

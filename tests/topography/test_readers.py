@@ -14,6 +14,7 @@ import xarray as xr
 from scan_files import CELL, ROOT, SCANS, SHAPE, TABLE, card, file_card, real, refusal, tilted, write_x3p
 from support import refused
 
+import roughvisc as rv
 from roughvisc.errors import InputError
 from roughvisc.topography import formats
 from roughvisc.topography.formats import Channel, ScanFile, add_format, supported_formats
@@ -305,3 +306,22 @@ def test_add_format__is_read_by_suffix_and_by_name(tmp_path, monkeypatch):
     assert supported_formats()["ours"] == ("our",)
     add_format("ours", [], read)
     assert supported_formats()["ours"] == ()
+
+
+def test_topography_of_surface_topography__is_the_file_read_here_and_comes_back(tmp_path):
+    from SurfaceTopography import Topography, read_topography
+
+    heights = np.random.default_rng(1).normal(size=(7, 5))
+    Topography(heights, (14.0, 15.0), unit="um").to_matrix(str(tmp_path / "map.asc"))
+    opened, other = rv.open_scan(tmp_path / "map.asc"), read_topography(tmp_path / "map.asc")
+    for found in (rv.from_topography(other), rv.from_topography(rv.to_topography(opened, unit="um"))):
+        for name, values in {"height": found.values, "x": found.x.values, "y": found.y.values}.items():
+            np.testing.assert_allclose(values, opened.values if name == "height" else opened[name].values, rtol=1e-12)
+    with refused("topography"):
+        rv.from_topography(opened)
+
+
+def test_surface_of_surfalize__has_lines_from_the_top_in_micrometres():
+    top_first = SimpleNamespace(data=np.array([[4.0, 5.0, 6.0], [1.0, 2.0, 3.0]]), step_x=0.5, step_y=2.0)
+    expected = rv.from_array(1e-6 * np.array([[1.0, 4.0], [2.0, 5.0], [3.0, 6.0]]), ("0.5 um", "2 um"))
+    xr.testing.assert_allclose(rv.from_topography(top_first), expected)

@@ -96,7 +96,7 @@ def numbers(text, names, folder):
     """Quantities of a study's case over its rows."""
     path = Path(folder) / "study.toml"
     path.write_text(text)
-    case = rv.vary(rv.read_study(path), {"keep.fields": ["pressure", "gap"]})
+    case = rv.vary(rv.read_study(path), {"keep.fields": ("pressure", "gap")})
     result = rv.run(case, out=Path(folder) / "runs", progress=False).load()
     return {name: QUANTITIES[name].of(result, case) for name in names}
 

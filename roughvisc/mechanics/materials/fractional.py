@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.material import Creep, check_poisson
+from roughvisc.mechanics.materials.material import Creep, check_poisson, remembers_model
 from roughvisc.units import Quantity, number, quantities
 
 Array = NDArray[np.float64]
@@ -19,6 +19,7 @@ _END, _STEP = 40.0, 0.25
 
 
 @quantities(instantaneous="Pa > 0", equilibrium="Pa > 0", relaxation_time="s > 0", exponent="1 > 0")
+@remembers_model
 def fractional_zener(
     instantaneous: Quantity, equilibrium: Quantity, relaxation_time: Quantity, exponent: float, poisson: float = 0.5
 ) -> Creep:

@@ -9,10 +9,11 @@ A creep function is not negative and does not decrease. For a passive material i
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
-from typing import Any, Self
+from functools import partial, wraps
+from inspect import signature
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +25,7 @@ from roughvisc.mechanics.quadrature import panels
 from roughvisc.units import Quantity, number, quantities
 
 Array = NDArray[np.float64]
+_Making = TypeVar("_Making", bound=Callable[..., Any])
 
 #: Largest shift factor; its inverse is the smallest. Factors beyond result from a temperature in a wrong unit.
 LARGEST_SHIFT = 1e30
@@ -51,6 +53,38 @@ def check_terms(
     for i, (term, time) in enumerate(zip(terms, times, strict=True)):
         number(term, unit, f"{name}[{i}]", least=0)
         number(time, "s", f"{name_of_times}[{i}]", above=0)
+
+
+def remembers_model(function: _Making) -> _Making:
+    """Decorate a function that returns a material, which then keeps the arguments of the call as its model."""
+    taking = signature(function)
+
+    @wraps(function)
+    def called(*args: Any, **given: Any) -> Any:
+        material = function(*args, **given)
+        model = {"model": function.__name__, **taking.bind(*args, **given).arguments}
+        return replace(material, model={name: value for name, value in model.items() if value is not None})
+
+    return called  # type: ignore[return-value]
+
+
+@dataclass(frozen=True)
+class SeriesError:
+    """Error of a series that replaces a creep function in a run.
+
+    Attributes
+    ----------
+    error : float
+        Largest relative deviation from `shortest` on. [-]
+    shortest : float
+        Shortest time of the fit. [s]
+    early : float
+        Error below the shortest time, see :func:`~roughvisc.mechanics.memory.early_error`. [-]
+    """
+
+    error: float
+    shortest: float
+    early: float
 
 
 @quantities(glassy="1/Pa >= 0", fluidity="1/(Pa s) >= 0", compliances="1/Pa ...", times="s ...")
@@ -82,6 +116,10 @@ class Prony:
         Largest relative deviation from the rows of a creep table, zero if it is within their noise.
     thermal : ThermalLaw or PairLaw
         Law by which the material changes with temperature, if it has one; :meth:`at` uses it.
+    model : mapping
+        Model of a study file that gives this material, and its arguments in SI; empty if unknown.
+    replaces : SeriesError, optional
+        Error of a series that replaces a creep function.
 
     Raises
     ------
@@ -101,6 +139,8 @@ class Prony:
     warning: str = field(default="", compare=False, repr=False)
     misfit: float = field(default=0.0, compare=False, repr=False)
     thermal: ThermalLaw | PairLaw | None = field(default=None, compare=False, repr=False)
+    model: Mapping[str, Any] = field(default_factory=dict, compare=False, repr=False)
+    replaces: SeriesError | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "compliances", tuple(map(float, self.compliances)))
@@ -168,6 +208,7 @@ class Prony:
             compliances=tuple(one / modulus_factor for one in self.compliances),
             times=tuple(time_factor * one for one in self.times),
             longest=time_factor * self.longest,
+            replaces=self.replaces and replace(self.replaces, shortest=time_factor * self.replaces.shortest),
             note="; ".join(filter(None, (self.note, note))),
             thermal=self.thermal and self.thermal.scaled(time_factor, modulus_factor),
         )
@@ -229,6 +270,8 @@ class Creep:
         Name of the bodies if the function is not one body with this Poisson ratio; otherwise empty.
     thermal : ThermalLaw or PairLaw
         Law by which the material changes with temperature, if it has one; :meth:`at` uses it.
+    model : mapping
+        Model of a study file that gives this material, and its arguments in SI; empty if unknown.
     """
 
     function: Callable[..., Any]
@@ -242,6 +285,7 @@ class Creep:
     misfit: float = field(default=0.0, compare=False)
     stands_for: str = field(default="", compare=False)
     thermal: ThermalLaw | PairLaw | None = field(default=None, compare=False)
+    model: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:
         return f"{self.function.__name__}({', '.join(map(repr, self.parameters))})"
@@ -428,6 +472,7 @@ def creep(
 
 
 @quantities(glassy="1/Pa >= 0", coefficient="1/Pa > 0", exponent="1 > 0", time_scale="s > 0")
+@remembers_model
 def power_law(
     glassy: Quantity, coefficient: Quantity, exponent: float, time_scale: Quantity = 1.0, poisson: float = 0.5
 ) -> Creep:
@@ -483,6 +528,7 @@ def pair_creep(t: Array, a: Material, b: Material) -> Array:
     return 4 * (a.contact_compliance(t) + b.contact_compliance(t))
 
 
+@remembers_model
 def pair(a: Material, b: Material) -> Material:
     """Two deformable bodies: their contact compliances add.
 
@@ -647,7 +693,9 @@ def shift(material: Material, factor: float) -> Material:
     3e-06
     """
     factor = number(factor, "1", "factor", least=1 / LARGEST_SHIFT, most=LARGEST_SHIFT)
-    return check_material(material).scaled(factor, 1.0, _SHIFTED.format(factor))
+    shifted = check_material(material).scaled(factor, 1.0, _SHIFTED.format(factor))
+    model = material.model
+    return replace(shifted, model={**model, "shift_factor": factor * model.get("shift_factor", 1.0)} if model else {})
 
 
 @quantities(reference_temperature="K > 0", activation_energy="J/mol > 0", wlf_c1="1 > 0")

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.material import Prony, check_poisson, check_terms
+from roughvisc.mechanics.materials.material import Prony, SeriesError, check_poisson, check_terms, remembers_model
 from roughvisc.units import Quantity, quantities
 
 Array = NDArray[np.float64]
@@ -37,6 +37,7 @@ def tensile_to_shear(kind: Kind, poisson: float) -> float:
 
 
 @quantities(shear_modulus="Pa > 0", young_modulus="Pa > 0")
+@remembers_model
 def elastic(
     shear_modulus: Quantity | None = None, poisson: float = 0.5, *, young_modulus: Quantity | None = None
 ) -> Prony:
@@ -71,6 +72,7 @@ def elastic(
 
 
 @quantities(shear_modulus="Pa > 0", viscosity="Pa s > 0")
+@remembers_model
 def maxwell(shear_modulus: Quantity, viscosity: Quantity, poisson: float = 0.5) -> Prony:
     """Maxwell fluid: a spring in series with a dashpot; ``J = 1/G + t/eta``.
 
@@ -96,6 +98,7 @@ def maxwell(shear_modulus: Quantity, viscosity: Quantity, poisson: float = 0.5) 
 
 
 @quantities(shear_modulus="Pa > 0", viscosity="Pa s > 0")
+@remembers_model
 def kelvin_voigt(shear_modulus: Quantity, viscosity: Quantity, poisson: float = 0.5) -> Prony:
     """Kelvin-Voigt solid: a spring parallel to a dashpot; ``J = (1 - exp(-G t / eta)) / G``.
 
@@ -121,6 +124,7 @@ def kelvin_voigt(shear_modulus: Quantity, viscosity: Quantity, poisson: float = 
 
 
 @quantities(shear_modulus="Pa > 0", kelvin_modulus="Pa > 0", kelvin_viscosity="Pa s > 0")
+@remembers_model
 def zener(shear_modulus: Quantity, kelvin_modulus: Quantity, kelvin_viscosity: Quantity, poisson: float = 0.5) -> Prony:
     """Zener (standard linear) solid: a spring in series with a Kelvin element.
 
@@ -155,6 +159,56 @@ def zener(shear_modulus: Quantity, kelvin_modulus: Quantity, kelvin_viscosity: Q
 
 
 @quantities(
+    glassy="1/Pa >= 0",
+    fluidity="1/(Pa s) >= 0",
+    compliances="1/Pa ...",
+    times="s ...",
+    error="1 >= 0",
+    shortest="s >= 0",
+    longest="s > 0",
+    early="1 >= 0",
+)
+@remembers_model
+def creep_series(
+    glassy: Quantity,
+    fluidity: Quantity = 0.0,
+    compliances: Sequence[Quantity] = (),
+    times: Sequence[Quantity] = (),
+    poisson: float = 0.5,
+    *,
+    error: float,
+    shortest: Quantity,
+    longest: Quantity,
+    early: float = 0.0,
+) -> Prony:
+    """Series that replaces a creep function of Python in a study file; :meth:`roughvisc.Case.to_toml` writes it.
+
+    Parameters
+    ----------
+    glassy, fluidity, compliances, times, poisson
+        Terms of the series, as in :class:`roughvisc.Prony`.
+    error : float
+        Largest relative deviation of the series from the function between `shortest` and `longest`; part of the stated
+        error of a result. [-]
+    shortest, longest : float or str
+        Times between which the series was fitted. A longer program is refused. [s]
+    early : float
+        Relative error of the series below `shortest`. [-]
+
+    Returns
+    -------
+    Prony
+
+    Raises
+    ------
+    InputError
+        If a number is out of its range.
+    """
+    known = SeriesError(error, shortest, early)
+    return Prony(glassy, fluidity, tuple(compliances), tuple(times), poisson, longest=longest, replaces=known)
+
+
+@quantities(
     equilibrium="Pa >= 0",
     moduli="Pa ...",
     times="s ...",
@@ -164,6 +218,7 @@ def zener(shear_modulus: Quantity, kelvin_modulus: Quantity, kelvin_viscosity: Q
     bulk_ratios="1 ...",
     bulk_times="s ...",
 )
+@remembers_model
 def from_relaxation(
     equilibrium: Quantity | None = None,
     moduli: Sequence[Quantity] = (),

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from roughvisc.arguments import one_of
 from roughvisc.errors import InputError
-from roughvisc.mechanics.materials.material import Prony, ThermalLaw
+from roughvisc.mechanics.materials.material import Prony, ThermalLaw, remembers_model
 from roughvisc.mechanics.materials.models import Kind, relaxation_series, tensile_to_shear
 from roughvisc.mechanics.materials.series import lattice, nonnegative
 from roughvisc.mechanics.materials.superposition import Vertical, groups_of, superpose
@@ -60,6 +60,7 @@ _DECADE = 10.0 * (1 + 1e-9)
 
 
 @quantities(times="s ...", compliances="1/Pa ...", noise="1 >= 0", temperatures="K ...", temperature="K > 0")
+@remembers_model
 def creep_table(
     times: Sequence[Quantity],
     compliances: Sequence[Quantity],
@@ -121,6 +122,7 @@ def creep_table(
 
 
 @quantities(times="s ...", moduli="Pa ...", noise="1 >= 0", temperatures="K ...", temperature="K > 0")
+@remembers_model
 def relaxation_table(
     times: Sequence[Quantity],
     moduli: Sequence[Quantity],
@@ -176,6 +178,7 @@ def relaxation_table(
 @quantities(
     frequencies="1 ...", storage="Pa ...", loss="Pa ...", noise="1 >= 0", temperatures="K ...", temperature="K > 0"
 )
+@remembers_model
 def dynamic_table(
     frequencies: Sequence[float],
     storage: Sequence[Quantity],

@@ -90,7 +90,7 @@ def test_second__is_the_sum_of_both_faces_the_second_turned_over(surface):
     one, two = surface(WAVES).height(), surface(WAVES | {"second": SECOND}, boundary="periodic")
     other = rv.self_affine(1e-3, (64, 48), hurst=0.8, rms_slope=0.1, seed=4)
     np.testing.assert_array_equal(two.height(), rv.combine(one, other, "x"))
-    moved = vary(two, {"surface.second.flip": "none", "surface.second.offset": ["20 um", 0]})
+    moved = vary(two, {"surface.second.flip": "none", "surface.second.offset": ("20 um", 0)})
     np.testing.assert_array_equal(moved.height(), rv.combine(one, other, offset=(2e-5, 0)))
     # steps of a face come before the sum; resampling after it
     case = vary(two, {"surface.invert": True, "surface.second.level": 2, "surface.resample": 20})
