@@ -37,8 +37,8 @@ log = logging.getLogger("roughvisc")
 #: Number of cases at the scheduler at a time, and least number for each worker. The first result does not wait until
 #: all cases are sent, and the memory of the scheduler does not grow with the sweep.
 _WINDOW, _CASES_AHEAD = 200, 4
-#: Time between two looks at finished cases. [s]
-_POLL_EVERY = 0.02
+#: Time between two looks at finished cases, and for short cases. [s]
+_POLL_EVERY, _POLL_SHORT = 0.1, 0.02
 #: Time between two reports of one case. [s]
 _REPORT_EVERY = 0.5
 #: Time for running cases to finish their step after an interrupt. [s]
@@ -224,6 +224,7 @@ def distribute(
     alone_since = time.monotonic()
     try:
         waiting = iter(cases)
+        pause = _POLL_EVERY
         while True:
             room = max(_WINDOW, _CASES_AHEAD * len(client.nthreads())) - len(futures)
             if room > 0 and (keys := list(islice(waiting, room))):
@@ -233,6 +234,7 @@ def distribute(
             for future in finished.next_batch(block=False):
                 key = futures.pop(future)
                 outcome = _outcome(key, future)
+                pause = min(pause, max(_POLL_SHORT, outcome.seconds / 10))
                 if outcome.error == IN_USE and len(workers[key]) > 1 and key not in taken_over:
                     taken_over.add(key)  # a lost worker of this sweep still holds the lock
                     with suppress(OSError):  # then the case is refused once more
@@ -244,7 +246,7 @@ def distribute(
                     submit([key])
                 else:
                     raise RoughviscError(_LOST)
-            time.sleep(_POLL_EVERY)
+            time.sleep(pause)
             if time.monotonic() - alone_since > _ALONE_AFTER:
                 alone_since = time.monotonic()
                 if not client.nthreads():

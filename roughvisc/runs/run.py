@@ -35,6 +35,10 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("roughvisc")
 
+#: Largest number of cells of heights that are kept for the next case, and the kept heights by their table.
+_KEPT = 512**2
+_LAST_HEIGHT: dict[str, xr.DataArray] = {}
+
 #: Facts that a stored result omits, because its attribute ``case`` determines them.
 _IN_THE_CASE = ("compliance_at_end", "poisson", "time_scale", "base")
 #: How a case ended. ``hindered``: stopped by a cause outside the case (a full disk, too little memory, a killed
@@ -87,7 +91,7 @@ def compute(
     InputError, ConvergenceError
         As :func:`roughvisc.simulate` and :func:`roughvisc.friction`, with the study's name in front.
     """
-    height = case.height()
+    height = _height_of(case)
     try:
         problem = Problem(height, case.body, case.settings)
         dataset = solve(problem, case.experiment, keeper, progress=progress, threads=threads)
@@ -112,6 +116,18 @@ def compute(
     dataset.attrs = provenance | split(dataset.attrs, *_IN_THE_CASE)[1]
     data = json.loads(stated)
     return dataset.assign_coords(labels_of(data.get("varied", {}), data))
+
+
+def _height_of(case: Case) -> xr.DataArray:
+    """Return the heights of a case; small ones of the last case in this process are kept for an equal surface. [m]"""
+    stated = json.dumps([dict(case.surface), case.checksums], default=str)
+    if stated in _LAST_HEIGHT:
+        return _LAST_HEIGHT[stated].copy()
+    height = case.height()
+    _LAST_HEIGHT.clear()
+    if height.size <= _KEPT:
+        _LAST_HEIGHT[stated] = height.copy()
+    return height
 
 
 def run_case(
