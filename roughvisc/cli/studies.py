@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
@@ -196,6 +197,7 @@ def _run_one(case: Case, folder: Path, console: Console, plots: bool, threads: i
     from roughvisc.runs.folder import case_path
     from roughvisc.runs.run import is_result_of
     from roughvisc.runs.sweep import run_one
+    from roughvisc.study.case_text import file_stems
 
     if is_result_of(case, case_path(folder, case.key, "result")):
         say(console, "Already finished: nothing to compute")
@@ -205,7 +207,8 @@ def _run_one(case: Case, folder: Path, console: Console, plots: bool, threads: i
         console.print(result_table(dataset))
         say_path(console, "Result", path)
         if plots:
-            say_figures(console, save_figures(dataset, folder, case.key, names=DEFAULT))
+            stem = file_stems({case.key: json.loads(case.to_json())})[case.key]
+            say_figures(console, save_figures(dataset, folder, stem, names=DEFAULT))
 
 
 def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, **computing: Any) -> None:

@@ -143,10 +143,14 @@ def save_figures_of_files(
         Format of the files.
     """
     cases: dict[str, Any] = {}
+    named: dict[str, Any] = {}
     for path in paths:
         with open_result(path) as dataset:
             cases[path.stem] = json.loads(dataset.attrs.get("case", "{}"))
-    stems, jobs = file_stems(cases) if len(paths) > 1 else {}, []
+            if dataset.attrs.get("case_key") == path.stem:  # a renamed file keeps its own name
+                named[path.stem] = cases[path.stem]
+    stems = file_stems(named)
+    jobs: list[Any] = []
     for path in paths:
         known, with_surface = FIGURES if every else DEFAULT, not jobs or varies_surface(cases[path.stem])
         names = [name for name in known if name != "surface" or with_surface]

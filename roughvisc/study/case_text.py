@@ -104,7 +104,7 @@ def case_words(case: Mapping[str, Any]) -> str:
 
 
 def file_stems(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
-    """Return stems of file names of cases: the varied values in portable letters, otherwise the keys.
+    """Return stems of file names of cases in portable letters: the varied values, or the title, or the key.
 
     A stem depends only on its case. If two stems differ only in capitals, both get their keys added.
 
@@ -125,7 +125,8 @@ def file_stems(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
         for dotted, text in texts.items():
             value = PurePath(text).stem if dotted.rpartition(".")[2] == "file" else text
             parts.append(f"{_safe(names[dotted].lower())}_{_safe(value)}")
-        stem = "-".join(parts)
+        title = str(case.get("title", ""))
+        stem = "-".join(parts) or (_safe(title) if title else "")
         stems[key] = (stem if len(stem) <= _LONGEST else f"{stem[: _LONGEST - _KEY - 1]}-{key[:_KEY]}") or key
     counts = Counter(stem.casefold() for stem in stems.values())
     return {key: stem if counts[stem.casefold()] == 1 else f"{stem}-{key[:_KEY]}" for key, stem in stems.items()}

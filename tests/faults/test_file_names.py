@@ -34,12 +34,11 @@ NAMES = {
     "KEY.failed.json",
     "KEY.nc.damaged",
     "KEY.csv",
-    "KEY-history.png",
+    "load_5mN-history.png",
     "KEY-report.html",
     "load_5mN-maps.png",
     "sweep-force.png",
     "report.html",
-    "table.csv",
 }
 #: Names at which the program reads or appends without a rename.
 OPENED = (".cases.json.gz", ".index.json.gz", "sweep.log", ".KEY.unfinished/state.npz")

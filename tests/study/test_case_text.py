@@ -30,6 +30,7 @@ def test_file_stems__are_safe_and_tell_cases_apart():
         "1" * 16: case(surface__file='../$(rm -rf) "ä" <b>|?*.sur', material__fluidity=3e-7),
         "2" * 16: case(),
         "3" * 16: case(program__0__load=1.0, program__2__load=2.0),
+        "4" * 16: {"title": "A ball on rubber"},
     }
     stems = file_stems(cases)
     assert stems["a" * 16] == "load_2N-hold_5s"
@@ -38,6 +39,7 @@ def test_file_stems__are_safe_and_tell_cases_apart():
     assert stems["d" * 16] == "load_5MN-dddddddd"
     assert stems["e" * 16] == "file_a-eeeeeeee"
     assert stems["2" * 16] == "2" * 16
+    assert stems["4" * 16] == "A_ball_on_rubber"
     assert stems["3" * 16] == "load_program.0_1N-load_program.2_2N"
     assert len({stem.casefold() for stem in stems.values()}) == len(cases)
     assert all(re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,89}", stem) for stem in stems.values()), stems
