@@ -34,6 +34,7 @@ _EXTRA = {
         "title": ("", "`untitled`", "title of the study and its figures"),
         "surface": ("", "required", "the surface"),
         "material": ("", "required", "the body"),
+        "adhesion": ("", "none", "attraction of the surfaces"),
         "program": ("", "none", "list of segments; this or `friction` is required"),
         "friction": ("", "none", "steady sliding"),
         "solve": ("", "none", "how it is computed"),
@@ -131,6 +132,7 @@ TABLES = {
         | _of(rv.shift, shift_factor="factor"),
     ),
     "material: thickness": ("material", _of(rv.sheet, "thickness", "base") | _of(rv.layer, "on")),
+    "adhesion": ("adhesion", _all(rv.adhesion)),
     **{
         f"program: {kind}": (
             "program.0",

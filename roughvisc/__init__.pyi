@@ -11,6 +11,7 @@ from roughvisc.errors import InputError as InputError
 from roughvisc.errors import RoughviscError as RoughviscError
 from roughvisc.errors import TooLargeError as TooLargeError
 from roughvisc.mechanics import closed_forms as closed_forms
+from roughvisc.mechanics.adhesion import adhesion as adhesion
 from roughvisc.mechanics.body import Body as Body
 from roughvisc.mechanics.layer import layer as layer
 from roughvisc.mechanics.materials.creep import Prony as Prony

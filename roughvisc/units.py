@@ -33,12 +33,13 @@ else:
 _Taking = TypeVar("_Taking", bound=Callable[..., Any])
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_FACTOR = r"[^\W\d_]+(?:_[^\W\d_]+)*(?:\s*(?:\^|\*\*)\s*[+-]?\d(?:\.\d)?|[²³])?"
+_FACTOR = r"[^\W\d_]+(?:_[^\W\d_]+)*(?:\s*(?:\^|\*\*)\s*[+-]?\d(?:\.\d)?|[²³23])?"
 # A grammar in front of pint: pint evaluates arithmetic, and "9**9**9**9 m" would not end.
 _PRODUCT = rf"{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*"
 # in "0.31/MPa" the number is 0.31: the 1 of an inverse unit has to be separated by a blank
 _INVERSE = rf"(?:(?<=\s)1\s*)?/\s*(?:{_FACTOR}|\({_PRODUCT}\))"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(%|{_PRODUCT}|{_INVERSE})?\s*")
+_POWER = re.compile(r"(?<=[^\W\d_])(?=[23])")
 # pint counts angles as pure numbers, but a slope of 45 degrees is 1 and not 0.785
 _ANGLES = {"degree", "radian", "turn", "grade", "arcminute", "arcsecond", "gradian"}
 
@@ -288,7 +289,7 @@ def _parsed(text: str, unit: str, difference: bool) -> float:
 
     registry = get_application_registry()
     try:
-        known = "percent" if found == "%" else found.replace("·", "*")
+        known = "percent" if found == "%" else _POWER.sub("^", found.replace("·", "*"))  # m^2 for m2
         names = registry.parse_units_as_container(f"1{known}" if known.startswith("/") else known)
         given, expected = registry.Unit(names), registry.Unit("" if dimensionless else unit)
         if given.dimensionality != expected.dimensionality or (dimensionless and not _ANGLES.isdisjoint(names)):

@@ -111,6 +111,8 @@ VARIABLES: dict[str, Variable] = {
         "of the rigid profile since first touch of its highest point; in free space against the undeformed plane, "
         "otherwise against the mean plane of the body; of an open contact the value at which it would just close",
     ),
+    "adhesive_force": Variable(_STEPS, "N", "adhesive force", "integral of the tension, in contact cells too"),
+    "dissipated_energy": Variable(_STEPS, "J", "dissipated energy", "of jumps of an elastic body with adhesion"),
     "nominal_pressure": Variable(_STEPS, "Pa", "nominal pressure", "force over the area of all cells, absent ones too"),
     "work": Variable(_STEPS, "J", "work", "of the force on the approach; if periodic without the uniform displacement"),
     "contact_area": Variable(_STEPS, "m^2", "contact area", "without the excess of the staircase of cells at its edge"),

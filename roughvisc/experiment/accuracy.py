@@ -118,7 +118,7 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
     control = scene.program.segments[step.segment].control
     given, remembers = scene.program.prescribes[step.segment], not scene.memory.is_elastic
     largest_force, largest_approach = largest
-    loaded = max(state.largest_force, point.force, 1e-300)
+    loaded = max(state.largest_force, point.size, 1e-300)
     reached = max(state.largest_approach, abs(point.approach), 1e-300)
     age = point.time - scene.program.corners[step.segment]
     if age > 0 and scene.memory.early > 0:
@@ -133,12 +133,12 @@ def error_columns(step: Step, scene: Scene, series_error: float, largest: tuple[
     work += (of_work * solved + series_error) * loaded * reached
     force = approach = 0.0
     if control == "approach" or not given:
-        force = apart.force + solved * point.force + of_force
+        force = apart.force + solved * point.size + of_force
     if control == "load" or not given:
         approach = apart.approach + point.solver_error_approach + series_error * reached
         approach += INHERITED_APPROACH * state.solver_error * reached if remembers else 0.0
     stepped = apart.pressure + apart.shared
-    pressure = (stepped + solved * point.force + of_force) / largest_force if largest_force > 0 else solved
+    pressure = (stepped + solved * point.size + of_force) / largest_force if largest_force > 0 else solved
     per_force, per_approach = largest_force or math.inf, largest_approach or math.inf
     return {
         "time_error": max(stepped / per_force, apart.force / per_force, apart.approach / per_approach),

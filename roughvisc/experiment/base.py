@@ -131,5 +131,9 @@ class Experiment(ABC):
         """Return the progress in words."""
 
     @abstractmethod
-    def unsupported(self, settings: Settings) -> Iterator[tuple[str, Any, str]]:
-        """Yield the settings that this experiment does not support: name, value and expected value."""
+    def unsupported(self, settings: Settings, body: Body) -> Iterator[tuple[str, Any, str]]:
+        """Yield the settings that this experiment does not support on a body: name, value and expected value."""
+
+    def check_cells(self, problem: Problem) -> None:
+        """Refuse a surface whose cells are too long for the problem."""
+        return

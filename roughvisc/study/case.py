@@ -19,6 +19,7 @@ from roughvisc.arguments import a_table, located, split
 from roughvisc.errors import InputError, RoughviscError, short_repr
 from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
+from roughvisc.mechanics.adhesion import Adhesion
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.materials.creep import Material
 from roughvisc.mechanics.program import Program
@@ -150,7 +151,7 @@ class Case:
         settings: dict[str, Any] = {"fields": sorted(self.settings.fields)}
         for one in fields(self.settings):
             if (value := getattr(self.settings, one.name)) != one.default:
-                settings.setdefault(one.name, value)
+                settings.setdefault(one.name, vars(value) if isinstance(value, Adhesion) else value)
         tables = {"material": self.tables["material"]}
         tables |= {"program": self.tables.get("program"), "friction": self.tables.get("friction")}
         surface = []

@@ -1,0 +1,97 @@
+"""Sticky contact: equilibrium of a state, pull-off, branches of an elastic body, and what is refused."""
+
+import math
+
+import numpy as np
+import pytest
+from support import refused
+
+import roughvisc as rv
+from roughvisc.mechanics.grid import Grid
+
+#: A soft ball at Tabor 1: radius, contact modulus, work and range.
+RADIUS, MODULUS, WORK = 1e-5, 1e6, 5e-3
+RANGE = (RADIUS * WORK**2 / MODULUS**2) ** (1 / 3)
+STICKY = rv.adhesion(work=WORK, range=RANGE)
+GEL = rv.elastic(shear_modulus=MODULUS / 4)
+PULLED = rv.Program().approach(2 * RANGE, over=1).approach(-4 * RANGE, over=1)
+
+
+def ball(cells=36, size=28 * RANGE):
+    return rv.sphere(radius=RADIUS, size=size, shape=cells)
+
+
+def press(surface, program=PULLED, material=GEL, adhesion=STICKY, **options):
+    return rv.simulate(surface, material, program, adhesion=adhesion, progress=False, **options)
+
+
+@pytest.mark.parametrize("boundary", ["free", "periodic", "mirror"])
+def test_state__is_in_equilibrium(boundary):
+    """Open cells carry the tension of their gap, contact cells no larger one, and the displacement is that of both."""
+    rng = np.random.default_rng(3)
+    heights = 0.4 * RANGE * rng.standard_normal((13, 10))
+    heights[3, 4:6] = np.nan
+    side = 0.4 * RANGE**2 * MODULUS / WORK
+    surface = rv.from_array(heights, spacing=side)
+    program = rv.Program().approach(0.9 * RANGE, over=1).approach(0.1 * RANGE, over=1)
+    ds = press(
+        surface,
+        program,
+        boundary=boundary,
+        missing="absent",
+        tolerance=1e-7,
+        times=[0.5, 2],
+        fields=("pressure", "gap", "displacement"),
+        edge="accept",
+    )
+    grid = Grid((13, 10), (side, side), boundary)
+    for row in range(2):
+        pressure, gap = ds.pressure.values[row], ds.gap.values[row]
+        tension = STICKY.strength * np.exp(-gap / RANGE)
+        contact, solid = gap == 0, np.isfinite(gap)
+        assert 1 < contact.sum() < 120
+        largest = np.abs(pressure).max()
+        np.testing.assert_allclose(pressure[solid & ~contact], -tension[solid & ~contact], atol=1e-5 * largest)
+        assert (pressure[contact] > -STICKY.strength * (1 + 1e-5)).all()
+        assert (pressure[~solid] == 0).all()
+        moved = grid.displacement(pressure) / MODULUS
+        expected = (ds.approach.values[row] - (np.nanmax(heights) - heights) + gap)[solid]
+        np.testing.assert_allclose(moved[solid], expected, atol=1e-5 * RANGE)
+        assert float(ds.adhesive_force[row]) == pytest.approx(tension[solid].sum() * side**2, rel=1e-6)
+        assert float(ds.contact_area[row]) < contact.sum() * side**2
+
+
+@pytest.mark.parametrize(
+    ("program", "lowest"),
+    [
+        (rv.Program.table([0, 1], [0, -1.0]), -1.0),
+        (rv.Program.table([0], [-1.0], "pressure"), -1.0),
+        (rv.Program.cycle(1.0, 2.0, 1.0, 3), -1.0),
+    ],
+)
+def test_tension__needs_adhesion(program, lowest):
+    with refused("program", lowest):
+        press(ball(), program, adhesion=None)
+    with refused("program", lowest):
+        press(ball(), program, adhesion=rv.adhesion(work=0, range=RANGE))
+
+
+def test_unsupported_bodies_and_motions__are_refused_by_name():
+    wave = rv.wavy(RANGE, 20 * RANGE, 20 * RANGE, 40)
+    slide = rv.Program().approach(0, over=0).slide(3 * RANGE, over=1)
+    with refused("adhesion", STICKY):
+        press(wave, slide)
+    with refused("adhesion", STICKY):
+        press(wave, material=rv.sheet(GEL, 1e-6))
+    with refused("device", "gpu"):
+        press(wave, numerics=rv.Numerics(device="gpu"))
+    with refused("range", "both"):
+        rv.adhesion(work=1, range=1, strength=1)
+
+
+def test_coarse_cells__are_refused_with_the_cell_that_fits():
+    side = 2.5 * RANGE**2 * MODULUS / WORK
+    with refused("adhesion.range", RANGE) as error:
+        press(ball(25, 25 * side), PULLED)
+    assert "cells of at most" in str(error.value)
+    assert math.isfinite(float(press(ball(25, 25 * side / 4)).force[-1]))
