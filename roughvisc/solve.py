@@ -24,7 +24,7 @@ from roughvisc.experiment.grid_error import with_grid_error
 from roughvisc.experiment.loading import Loading
 from roughvisc.labels import CARRIED, TITLE, label
 from roughvisc.mechanics.grid import transform_library
-from roughvisc.settings import Problem
+from roughvisc.settings import Problem, attraction
 from roughvisc.topography.grid import nominal_area
 from roughvisc.variables import OF_STEPS, STEP, STEPPED, VARIABLES
 from roughvisc.version import program_version
@@ -142,7 +142,8 @@ def solve(
     problem = problem.resolved(experiment)
     height, settings = problem.height, problem.settings
     runs_again = settings.grid_error and isinstance(experiment, Loading)  # a curve of steady sliding does so itself
-    needed = ("pressure",) if runs_again and "pressure" not in settings.fields else ()
+    needed = ("pressure", "gap") if attraction(settings) is not None else ("pressure",)
+    needed = tuple(name for name in needed if runs_again and name not in settings.fields)
     problem = replace(problem, settings=replace(settings, fields=(*settings.fields, *needed)))
     bar: AbstractContextManager[Progress | None] = nullcontext(progress if callable(progress) else None)
     if progress is True:

@@ -162,14 +162,14 @@ def area_error(step: Step, scene: Scene, length: float, pressure: Any, gap: Any,
     length : float
         Length of the step; zero for a jump. [s]
     pressure, gap : array, shape (nx, ny)
-        Pressure [Pa] and gap between the surfaces. [m]
+        Pressure in contact [Pa] and gap between the surfaces. [m]
     counted, area : float
         Contact area, counted and corrected for the grid. [m2]
     """
     point, apart, xp = step.point, step.difference, scene.grid.xp
     inside, outside = apart.inside, apart.outside
     if counted > 0 and point.solver_error > 0:
-        off = SOLVER_AT_EDGE * point.solver_error * point.force / counted
+        off = SOLVER_AT_EDGE * point.solver_error * point.size / counted
         closed = off * scene.grid.self_influence * scene.memory.compliance(length)
         closing = (pressure == 0) & (gap <= closed)
         if scene.present is not None:

@@ -265,6 +265,7 @@ class LoadingRows(Rows):
                 is_given = scene.time_step is not None or scene.program.segments[step.segment].slide is not None
                 kept = point.time in ends or is_given or stated["stated_error"] <= CHOSEN * scene.tolerance
             largest = so_far if kept else largest
+            jumps = step.state.dissipated > (self.state.march.dissipated if self.state.march else 0.0)
             values, fields = {}, {}
             if step.is_end:
                 self.state = replace(self.state, march=step.state, largest=largest)
@@ -273,7 +274,7 @@ class LoadingRows(Rows):
             by_load = scene.program.segments[step.segment].control == "load"
             length = max(point.time - (point.before[0] if point.before else scene.program.corners[step.segment]), 0.0)
             if kept or (not every and (by_load or not scene.memory.grows(length, SOFT))):
-                values, fields = self._row(step, length, stated, kept)
+                values, fields = self._row(step, length, stated, kept, jumps)
             yield Row(point.time, values, fields, kept, self.state if step.is_end else None, point.time)
             del fields  # frees their memory while the next step is computed
 
@@ -292,7 +293,7 @@ class LoadingRows(Rows):
         )
 
     def _row(
-        self, step: Step, length: float, stated: dict[str, float], kept: bool
+        self, step: Step, length: float, stated: dict[str, float], kept: bool, jumps: bool
     ) -> tuple[dict[str, Any], dict[str, Array]]:
         """Return the variables of a step, and its fields on the whole surface.
 
@@ -306,6 +307,8 @@ class LoadingRows(Rows):
             Its stated errors.
         kept : bool
             Whether the step is a row of the result; otherwise it belongs only to the history of all steps.
+        jumps : bool
+            Whether the contact of an elastic body with adhesion jumps to another state in the step.
         """
         scene, profile, domain, point = self.scene, self.profile, self.domain, step.point
         grid, present, is_whole, xp = scene.grid, scene.present, domain.is_whole, scene.grid.xp
@@ -327,6 +330,7 @@ class LoadingRows(Rows):
         else:
             effective = to_host(displaced[-1])
             mean_gap = profile.mean_gap + float((effective * domain.mean_influence).sum()) - point.approach
+        status = "jump" if jumps else status
         row: dict[str, Any] = stated | {
             "force": point.force,
             "approach": point.approach,
@@ -356,7 +360,8 @@ class LoadingRows(Rows):
             }
         if not kept:
             return row, {}
-        row["contact_area_error"] = area_error(step, scene, length, pressure, gap, counted, area)
+        held = scene.contact_pressure(point, pressure)
+        row["contact_area_error"] = area_error(step, scene, length, held, gap, counted, area)
 
         names, beyond = self.problem.settings.fields, dict[str, Array]()  # fields outside the domain
         if not is_whole:
@@ -409,6 +414,8 @@ class LoadingRows(Rows):
                 f"{limit:g} (memory): no passive material comes nearer to it."
             )
         attributes: dict[str, Any] = {"memory": memory.note, "series_error": memory.series_error}
+        if scene.adhesion is not None:
+            attributes |= {"work_of_adhesion": scene.adhesion.work, "range_of_adhesion": scene.adhesion.range}
         if cycles := program.cycles:  # for the work in each cycle
             attributes["cycles"] = json.dumps(cycles)
         return dataset.assign_attrs(attributes), warnings

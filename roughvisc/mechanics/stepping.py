@@ -287,7 +287,9 @@ def attracted(scene: Scene, state: State) -> State:
     if not scene.can_jump or not segments or segments[0].duration == 0:
         return state
     scene.grid.convolutions = 0
-    return replace(single_step(scene, state, 0.0).state, segment=0)
+    after = single_step(scene, state, 0.0).state
+    lost = max(-after.work, 0.0) if scene.memory.is_elastic else 0.0  # the approach does not change
+    return replace(after, segment=0, work=0.0, dissipated=lost)
 
 
 def step_on_path(scene: Scene, state: State, segment: Segment, event: float) -> Step:

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm, Normalize
+from matplotlib.colors import LogNorm, Normalize, TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import Patch
@@ -40,6 +40,8 @@ _LOOK = {
     "flux": ("cividis_r", "max", style.NO_CONTACT, "below 0.1 % of the scale"),
     "height": ("cividis", "mean", None, ""),
 }
+#: Colour map of a pressure that is negative in some cells: tension blue, pressure red.
+_SIGNED = "RdBu_r"
 #: Largest number of drawn cells along the longer side, and of times or speeds in one figure.
 MOST_CELLS, _MOST_FRAMES = 1024, 8
 #: Part of the positive values within a colour scale [%], unless the largest value is less than this times larger.
@@ -110,7 +112,11 @@ def drawn(field: xr.DataArray) -> xr.DataArray:
     if every > 1:
         blocks = field.coarsen(x=every, y=every, boundary="pad", coord_func="min")
         to_centre = {axis: (every - 1) / 2 * side for axis, side in zip("xy", spacing(field), strict=True)}
-        field = getattr(blocks, _LOOK[str(field.name)][1])()
+        reduced = getattr(blocks, _LOOK[str(field.name)][1])()
+        if field.name == "pressure":  # the tension of a block, if it is larger than its pressure
+            lowest = blocks.min()
+            reduced = reduced.where(~(reduced < -lowest), lowest)
+        field = reduced
         field = field.assign_coords({axis: field[axis] + shift for axis, shift in to_centre.items()})
     return field.load()
 
@@ -128,12 +134,23 @@ def map_size(field: xr.DataArray | xr.Dataset, width: float, height: float) -> t
 
 
 def colour_scale(name: str, frames: Iterable[xr.DataArray]) -> tuple[Unit, Normalize]:
-    """Return unit and colour scale of a field at some rows; few values far beyond all others are above the scale."""
-    begins_at_zero, ends = _LOOK[name][2] is not None, []
+    """Return unit and colour scale of a field at some rows; few values far beyond all others are above the scale.
+
+    If a pressure is negative somewhere, zero is in the middle of the scale, and both ends have their full colour.
+    """
+    begins_at_zero, ends, signed = _LOOK[name][2] is not None, [], []
     for frame in frames:
+        if name == "pressure" and (frame.values < 0).any():
+            signed.append(np.nanpercentile(frame.values, (100 - _SHOWN, _SHOWN)))
         known = frame.values[frame.values > 0 if begins_at_zero else np.isfinite(frame.values)]
         if known.size:
             ends.append(np.percentile(known, (0, _SHOWN, 100)))
+    if signed:
+        low = np.min(signed, axis=0)[0]
+        high = max([np.max(signed, axis=0)[1], *(end[1] for end in ends)])
+        unit = unit_for([low, high], VARIABLES[name].units)
+        low = float(unit(low))
+        return unit, TwoSlopeNorm(0.0, low, max(float(unit(high)), -1e-3 * low))
     lowest, high, most = np.transpose(ends or [(0.0, 1.0, 1.0)])
     high = most.max() if most.max() < _SPIKE * high.max() else high.max()
     unit = unit_for([lowest.min(), high], VARIABLES[name].units)
@@ -158,6 +175,8 @@ def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, norm: Normalize) -> Axes
         Colour scale, in this unit.
     """
     plane, (colours, _, below, _) = plane_unit(field), _LOOK[str(field.name)]
+    if isinstance(norm, TwoSlopeNorm):
+        colours, below = _SIGNED, None
     x, y = map(plane, cell_edges(field))
     bad = style.CONTACT if field.name == "flux" else style.MISSING
     values, extent = np.ma.masked_invalid(unit(field.transpose("y", "x"))), (x[0], x[-1], y[0], y[-1])
@@ -175,12 +194,15 @@ def _draw_field(axes: Sequence[Axes], dataset: xr.Dataset, name: str, frames: Se
     for ax, one in zip(axes, shown, strict=True):
         image = draw_map(ax, one, unit, norm)
     values, named, (_, _, below, word) = unit(np.concatenate(shown)), {}, _LOOK[name]
-    if below and (values < norm.vmin).any():
+    is_signed = isinstance(norm, TwoSlopeNorm)
+    if below and not is_signed and (values < norm.vmin).any():
         named[word] = Patch(facecolor=below, edgecolor="0.5", lw=0.4)
     if np.isnan(values).any():
         label, colour = ("contact", style.CONTACT) if name == "flux" else ("missing", style.MISSING)
         named[label] = Patch(color=colour)
     extend = "max" if np.nanmax(values) > norm.vmax else "neither"
+    if is_signed and np.nanmin(values) < norm.vmin:
+        extend = "both" if extend == "max" else "min"
     style.colour_bar(image, axes, unit.label(VARIABLES[name].label), extend=extend)
     return named
 
@@ -195,8 +217,9 @@ def frame_title(dataset: xr.Dataset, frame: int) -> str:
 def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = ("pressure", "gap")) -> Figure:
     """Draw maps of fields at some times or speeds, with one colour scale for each field.
 
-    Cells without contact are light blue on a map of the pressure. Cells in contact are orange on maps of the gap and of
-    the flux. Above 1024 cells a side, one drawn cell
+    Cells without contact are light blue on a map of the pressure. If there is tension, zero is white, tension blue and
+    pressure red, each with its own scale. Cells in contact are orange on maps of the gap and of the flux. Above 1024
+    cells a side, one drawn cell
     shows the largest pressure and flux, and the smallest gap, of a block of cells. The colour scale may leave out two
     of a thousand values, marked by an arrow at the colour bar. The flux has a logarithmic scale of three decades.
 
@@ -293,7 +316,7 @@ def section(dataset: xr.Dataset, time: Any = None, axis: str = "x", at: Quantity
     edges, x = plane(cell_edges(dataset)["xy".index(axis)]), plane(dataset[axis])
     figure, (top, bottom) = style.new_panels(2, 1, (4.1, 1.4), shared="x")
     top.stairs(pressure(cut["pressure"]), edges, fill=True, fc=(0, 0.62, 0.45, 0.3), ec=style.GREEN, lw=1)
-    top.set(ylim=(0, None), ylabel=pressure.label("Pressure"))
+    top.set(ylim=(0 if float(cut["pressure"].min()) >= 0 else None, None), ylabel=pressure.label("Pressure"))
     bottom.plot(x, unit(height), color="0.25", lw=1)
     bottom.plot(x, unit(surface), color=style.BLUE, lw=1)
     look = {"color": style.CONTACT, "lw": 2.4, "ms": 2.4, "mew": 0, "label": "contact"}

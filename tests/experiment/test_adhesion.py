@@ -14,10 +14,10 @@ RADIUS, MODULUS, WORK = 1e-5, 1e6, 5e-3
 RANGE = (RADIUS * WORK**2 / MODULUS**2) ** (1 / 3)
 STICKY = rv.adhesion(work=WORK, range=RANGE)
 GEL = rv.elastic(shear_modulus=MODULUS / 4)
-PULLED = rv.Program().approach(2 * RANGE, over=1).approach(-4 * RANGE, over=1)
+PULLED = rv.Program().approach(RANGE, over=1).approach(-4 * RANGE, over=1)
 
 
-def ball(cells=36, size=28 * RANGE):
+def ball(cells=26, size=140 * RANGE):
     return rv.sphere(radius=RADIUS, size=size, shape=cells)
 
 
@@ -95,3 +95,31 @@ def test_coarse_cells__are_refused_with_the_cell_that_fits():
         press(ball(25, 25 * side), PULLED)
     assert "cells of at most" in str(error.value)
     assert math.isfinite(float(press(ball(25, 25 * side / 4)).force[-1]))
+
+
+def test_elastic_body__follows_its_branch_and_states_what_its_jumps_dissipate():
+    """Advancing and retracting surfaces jump at other approaches; a closed path dissipates the work done on it."""
+    soft = rv.elastic(shear_modulus=MODULUS / 10)
+    program = rv.Program().approach(-8 * RANGE, over=0).approach(0, over=1).approach(-8 * RANGE, over=2)
+    ds = press(ball(35, 126 * RANGE), program, soft, tolerance=1e-2, edge="accept")
+    steps = rv.observables.history(ds)
+    jumps = np.flatnonzero(steps.status == 3)
+    first, last = steps.approach.values[jumps[[0, -1]]]
+    assert last < first - RANGE / 3
+    assert (np.abs(np.diff(steps.approach))[jumps - 1] < 1e-2 * RANGE).all(), "a row before and one after"
+    lost = np.diff(steps.dissipated_energy)[jumps - 1]
+    assert (lost > 0).all()
+    assert float(ds.work[-1]) == pytest.approx(lost.sum(), rel=2e-2)
+    assert (ds.adhesive_force >= -ds.force * (1 - 1e-9)).all()
+    found = rv.observables.pull_off(ds)
+    assert float(found.pull_off_force[0]) == -float(steps.force.min())
+    assert float(found.pull_off_time[0]) < float(steps.time[jumps[-1]])
+    assert float(found.work_of_separation[0]) > lost.max()
+
+
+def test_load_below_the_pull_off__is_refused_with_the_largest_tension():
+    largest = 1.66 * math.pi * WORK * RADIUS  # at Tabor 1
+    program = rv.Program().load(0, over=0).load(-2 * largest, over=1)
+    with refused("load") as error:
+        press(ball(), program, tolerance=1e-2, edge="accept")
+    assert 0.95 < float(str(error.value).split("at least -")[1].split()[0]) * 1e-9 / largest < 1.02

@@ -141,7 +141,7 @@ class Elastic:
     def tension(self, gap: Array) -> Array:
         """Return the tension at all points."""
         xp = self.grid.xp
-        return xp.exp(-xp.minimum(gap, REACH)) * self.is_cell
+        return xp.exp(-xp.clip(gap, 0, REACH)) * self.is_cell
 
     def cut(self, gap: Array, total: float | None) -> Array:
         """Return gaps cut at zero, and scaled if the approach determines their sum `total`."""
@@ -283,6 +283,8 @@ def solve_adhesive(
         last = Previous(change, response - bend, curvature) if curvature > 0 else None
         length *= min(max(best, SHRINK), GROW_AFTER_CUT if was_cut else GROW)
 
+    if math.isinf(error):  # the given state is the solution
+        error = float(abs(state.residual * state.free).sum()) / total
     displaced = gap - heights
     if body.under_load:
         level = body.uniform * body.mean_response - float(displaced.mean())
@@ -389,7 +391,7 @@ def descend(
     while True:
         moved = gap + fraction * change
         moved = xp.where(body.is_cell, xp.maximum(moved, 0), moved)
-        after = inner(xp.exp(-xp.minimum(moved, REACH)), body.is_cell)
+        after = float(body.tension(moved).sum())
         rise = fraction * linear + fraction**2 * elastic / 2 + before - after
         if rise <= ROUNDED * before or fraction < 1e-8:
             return moved, fraction
