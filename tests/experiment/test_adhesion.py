@@ -1,9 +1,11 @@
 """Sticky contact: equilibrium of a state, pull-off, branches of an elastic body, and what is refused."""
 
 import math
+import re
 
 import numpy as np
 import pytest
+from references.rings import retracted
 from support import refused
 
 import roughvisc as rv
@@ -123,3 +125,71 @@ def test_load_below_the_pull_off__is_refused_with_the_largest_tension():
     with refused("load") as error:
         press(ball(), program, tolerance=1e-2, edge="accept")
     assert 0.95 < float(str(error.value).split("at least -")[1].split()[0]) * 1e-9 / largest < 1.02
+
+
+def test_pull_off_of_an_elastic_ball__is_that_of_dense_rings():
+    zero_load = (4.5 * math.pi * WORK / MODULUS * RADIUS**2) ** (1 / 3)
+    depth = math.pi ** (2 / 3) * RANGE
+    surface = rv.sphere(radius=RADIUS, size=4 * zero_load, shape=36)
+    program = rv.Program().approach(0, over=0).approach(-depth, over=1)
+    ds = press(surface, program, times=41, edge="accept", tolerance=1e-2)
+    rings = retracted(1.0, 1.0, 1.0, 0, -depth / RANGE, hold=1e-2, count=150, steps=60)
+    pull_off = -float(ds.force.min()) / (math.pi * WORK * RADIUS)
+    assert pull_off == pytest.approx(-rings[:, 1].min(), rel=0.015)
+    assert 1.5 < pull_off < 2, "between Johnson, Kendall, Roberts and Derjaguin, Muller, Toporov"
+
+
+def test_viscoelastic_pull_off__is_that_of_dense_rings():
+    """Pulled off fast the body is stiff behind the contact line, and carries more than at rest."""
+    program = rv.Program().approach(RANGE, over=0).hold(5).approach(-8 * RANGE, over=0.9)
+    zener = rv.zener(MODULUS, MODULUS / 3, MODULUS / 3)  # a quarter of the compliance at once
+    ds = press(ball(), program, zener, times=[5, *np.linspace(5.1, 5.9, 17)], tolerance=1e-2, edge="accept")
+    rings = retracted(1.0, 0.25, 10.0, 1.0, -8.0, hold=5.0, count=120, steps=150)
+    found = ds.force.values / (math.pi * WORK * RADIUS)
+    assert found[0] == pytest.approx(rings[60, 1], rel=0.03)
+    assert found.min() == pytest.approx(rings[:, 1].min(), rel=0.02)
+    assert found.min() < -1.05 * 1.664
+
+
+def test_no_work__is_no_adhesion():
+    program = rv.Program().approach(2 * RANGE, over=0.2).hold(0.3)
+    zener = rv.zener(MODULUS, MODULUS, MODULUS)
+    none, zero = (press(ball(), program, zener, adhesion=one, times=4) for one in (None, rv.adhesion(work=0, range=1)))
+    np.testing.assert_array_equal(zero.pressure, none.pressure)
+    little = press(ball(), program, zener, adhesion=rv.adhesion(work=1e-9 * WORK, range=RANGE), times=4, tolerance=1e-5)
+    np.testing.assert_allclose(little.force, none.force, atol=2e-3 * float(none.force.max()))
+
+
+def test_study_with_adhesion__is_read_swept_and_planned(study):
+    text = f"""
+[surface]
+generate = "sphere"
+radius = {RADIUS}
+size = {140 * RANGE}
+shape = 26
+[material]
+model = "elastic"
+shear_modulus = {MODULUS / 4}
+[adhesion]
+work = "5 mJ/m2"
+range = "{RANGE * 1e9} nm"
+[[program]]
+load = "-1 nN"
+over = "1 s"
+[solve]
+tolerance = 0.1
+[keep]
+times = [0, 1]
+[sweep]
+"adhesion.work" = ["5 mJ/m2", "50 mJ/m^2"]
+"""
+    first, second = study(text)
+    assert first.settings.adhesion == rv.adhesion(work=WORK, range=float(f"{RANGE:.15g}"))
+    assert first.key != second.key
+    assert rv.Case.from_json(first.to_json()).key == first.key
+    planned = rv.plan([first, second])
+    assert planned.refusal.values[0] == ""
+    assert "adhesion.range" in str(planned.refusal.values[1])
+    without = re.sub(r"\[adhesion\].*?(?=\[\[)", "", text.partition("[sweep]")[0], flags=re.S)
+    with refused("program.0.load", "-1 nN"):
+        study(without)
