@@ -41,11 +41,11 @@ def adhesion(
     Parameters
     ----------
     work : float or str
-        Work of adhesion: energy that separates a unit area of the surfaces. Zero is no adhesion. [J/m2]
+        Work of adhesion: energy that separates a unit area of the surfaces; zero: none. [J/m2]
     range : float or str
         Gap over which the tension falls by a factor of e. [m]
     strength : float or str
-        Largest tension, in place of the range. [Pa]
+        Largest tension, instead of the range. [Pa]
 
     Returns
     -------
@@ -81,9 +81,9 @@ def adhesion(
     """
     if (range is None) == (strength is None):
         found = "neither" if range is None else "both"
-        raise InputError(key="range", found=found, expected="a range [m], or a strength [Pa] in its place")
+        raise InputError(key="range", found=found, expected="either a range [m] or a strength [Pa]")
     if range is None:
         if work == 0:
-            raise InputError(key="work", found=work, expected="a work above 0, or a range in place of the strength")
+            raise InputError(key="work", found=work, expected="a work above 0, or a range instead of the strength")
         range = work / strength  # type: ignore[operator]
     return Adhesion(work, range)

@@ -92,9 +92,10 @@ def step_with_adhesion(
     try:
         state = solved(value)
     except PulledOff:
-        carried = largest_tension(solved, here.force, value)
-        expected = f"at least {format_quantity(-carried, 'N')} at {time:.6g} s, the largest tension that the contact "
-        raise InputError(key="load", found=value, expected=f"{expected}carries, or a prescribed approach") from None
+        carried = float(f"{largest_tension(solved, here.force, value):.3g}")
+        least = f"at least {format_quantity(-carried, 'N')} at {time:.6g} s"
+        expected = f"{least}, the largest tension that the contact carries, or a prescribed approach"
+        raise InputError(key="load", found=value, expected=expected) from None
     except ConvergenceError as error:
         raise ConvergenceError(f"at {time:.6g} s {error}; try a looser tolerance or finer cells") from error
     pressure = state.pressure / alpha

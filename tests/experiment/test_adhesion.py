@@ -193,3 +193,14 @@ times = [0, 1]
     without = re.sub(r"\[adhesion\].*?(?=\[\[)", "", text.partition("[sweep]")[0], flags=re.S)
     with refused("program.0.load", "-1 nN"):
         study(without)
+
+
+def test_maps_of_tension__have_zero_in_the_middle_of_their_scale():
+    program = rv.Program().approach(RANGE, over=0).approach(-2 * RANGE, over=1)
+    ds = press(ball(), program, times=[0, 0.5, 1], tolerance=1e-2, edge="accept")
+    figure = rv.plot.maps(ds, fields="pressure")
+    images = [image for axes in figure.axes for image in axes.images]
+    assert [image.norm(0.0) for image in images[:3]] == [0.5, 0.5, 0.5]
+    assert all(image.norm.vmin < 0 < image.norm.vmax for image in images[:3])
+    cells = rv.observables.contact(ds).sum(("x", "y")).values
+    assert cells[0] > (ds.pressure[0] > 0).sum(), "contact cells may be under tension"

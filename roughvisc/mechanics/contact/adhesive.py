@@ -28,7 +28,7 @@ from roughvisc.mechanics.contact.passes import inner
 from roughvisc.mechanics.grid import Grid
 
 Array = Any  # an array of NumPy or CuPy
-#: Gap beyond which there is no tension, in ranges.
+#: Gap beyond which the tension counts as zero, in ranges.
 REACH = 36.0
 #: Largest change of a gap in one step, in ranges, in cells whose tension is at least this part of the largest one.
 LEAP, FELT = 1.0, 0.01
@@ -159,7 +159,7 @@ class Elastic:
 
 
 class Balance(NamedTuple):
-    """Forces of a state: where they are not in balance, and which points may move.
+    """Forces of a state, their residual, and the points that may move.
 
     Attributes
     ----------
