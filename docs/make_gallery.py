@@ -55,6 +55,12 @@ FIGURES = {
         ),
         "maps": rv.plot.maps,
     },
+    "tack": {
+        "work": lambda results: rv.plot.sweep(results, "work", along="program.2.over"),
+        "force": lambda results: rv.plot.history(
+            results.isel(case=-3), ["force", "contact_area"], over="approach"
+        ),
+    },
     "stability_map": {},  # drawn by its script
 }
 SCRIPTS = {

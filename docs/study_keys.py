@@ -44,6 +44,7 @@ _EXTRA = {
         "title": ("", "`untitled`", "title of the study and its figures"),
         "surface": ("", "required", "the surface"),
         "material": ("", "required", "the body"),
+        "adhesion": ("", "none", "attraction of the surfaces"),
         "program": ("", "none", "list of segments; this or `friction` is required"),
         "friction": ("", "none", "steady sliding"),
         "solve": ("", "none", "how it is computed"),
@@ -111,8 +112,8 @@ def _all(function, *without, skipped=0):
     return _of(function, *(name for name in arguments(function, skipped) if name not in without))
 
 
-_SETTINGS = [name for name in arguments(Settings) if TABLE_OF[name] == "solve"]
-_KEPT = [name for name in arguments(Settings) if TABLE_OF[name] == "keep"]
+_SETTINGS = [name for name in arguments(Settings) if TABLE_OF.get(name) == "solve"]
+_KEPT = [name for name in arguments(Settings) if TABLE_OF.get(name) == "keep"]
 #: Table of the page -> place of its keys in a study, and the argument of each key.
 TABLES = {
     "study": ("", {}),
@@ -148,6 +149,7 @@ TABLES = {
         | _of(rv.shift, shift_factor="factor"),
     ),
     "material: thickness": ("material", _of(rv.sheet, "thickness", "base") | _of(rv.layer, "on")),
+    "adhesion": ("adhesion", _all(rv.adhesion)),
     **{
         f"program: {kind}": (
             "program.0",

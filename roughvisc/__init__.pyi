@@ -18,6 +18,7 @@ from roughvisc.judge.budget import budget as budget
 from roughvisc.judge.plan import plan as plan
 from roughvisc.judge.trade import trade as trade
 from roughvisc.mechanics import closed_forms as closed_forms
+from roughvisc.mechanics.adhesion import adhesion as adhesion
 from roughvisc.mechanics.body import Body as Body
 from roughvisc.mechanics.heating import Heating as Heating
 from roughvisc.mechanics.layer import layer as layer

@@ -16,6 +16,7 @@ from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.problem import Problem
 from roughvisc.experiment.sliding import SteadySliding
 from roughvisc.labels import warnings_of
+from roughvisc.mechanics.adhesion import Adhesion
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.heating import Heating
 from roughvisc.mechanics.materials.material import Material
@@ -42,6 +43,7 @@ def simulate(
     missing: Missing = Settings.missing,
     edge: Edge = Settings.edge,
     grid_error: bool | Literal["auto"] = Settings.grid_error,
+    adhesion: Adhesion | None = None,
     numerics: Numerics = Numerics(),
     threads: int | None = None,
     progress: bool | Progress = True,
@@ -85,6 +87,10 @@ def simulate(
         Whether to estimate the grid error from one more run, on cells twice as long: ``grid_error``,
         ``grid_error_area`` and others at the output times. ``auto``: from 256 x 256 to 512 x 512
         cells, if the pressure is kept; then this run takes at most a third of the time of the first.
+    adhesion : Adhesion, optional
+        Attraction of the surfaces, from :func:`roughvisc.adhesion`: on a half-space, without slides, on the CPU. Loads
+        may then be negative, but an approach follows the contact until it separates. An elastic body follows its
+        branch. Default: no attraction.
     numerics : Numerics
         Settings that are rarely changed: length of the time steps, device.
     threads : int, optional
@@ -130,6 +136,7 @@ def simulate(
         "missing": missing,
         "edge": edge,
         "grid_error": grid_error,
+        "adhesion": adhesion,
     }
     return _solved(height, material, Loading(program), settings, numerics, 3, progress=progress, threads=threads)
 

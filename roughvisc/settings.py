@@ -15,6 +15,7 @@ import numpy as np
 
 from roughvisc.arguments import listed_names
 from roughvisc.errors import InputError
+from roughvisc.mechanics.adhesion import Adhesion
 from roughvisc.units import listed, number
 from roughvisc.variables import FIELDS
 
@@ -32,7 +33,7 @@ WORDS: dict[str, tuple[str, ...]] = {
     "device": get_args(Device),
 }
 #: Settings without a meaning in steady sliding.
-OVER_TIME = ("times", "missing", "edge", "time_step")
+OVER_TIME = ("times", "missing", "edge", "time_step", "adhesion")
 #: Smallest tolerance. Rounding errors are of this order, and a run with a smaller tolerance would not end.
 FINEST_TOLERANCE = 1e-12
 #: Largest number of kept times.
@@ -82,7 +83,7 @@ class Settings(Numerics):
 
     Parameters
     ----------
-    boundary, tolerance, times, fields, edge, missing, grid_error
+    boundary, tolerance, times, fields, edge, missing, grid_error, adhesion
         As in :func:`roughvisc.simulate`; any sequence of times or fields becomes a tuple.
     time_step, device
         As in :class:`Numerics`.
@@ -106,6 +107,7 @@ class Settings(Numerics):
     edge: Edge = "error"
     missing: Missing = "refuse"
     grid_error: bool | Literal["auto"] = "auto"
+    adhesion: Adhesion | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -121,6 +123,14 @@ class Settings(Numerics):
         if not all(name in FIELDS for name in names):
             raise InputError(key="fields", found=self.fields, expected=f"some of {', '.join(FIELDS)}")
         grid_error = self.grid_error if self.grid_error == "auto" else bool(self.grid_error)
+        if not isinstance(self.adhesion, Adhesion | None):
+            expected = "rv.adhesion(work=..., range=...), or None"
+            raise InputError(key="adhesion", found=self.adhesion, expected=expected)
         found = {"tolerance": tolerance, "times": times, "fields": names, "grid_error": grid_error}
         for name, value in found.items():
             object.__setattr__(self, name, value)
+
+
+def attraction(settings: Settings) -> Adhesion | None:
+    """Return the attraction of the surfaces; None without adhesion, or if its work is zero."""
+    return settings.adhesion if settings.adhesion is not None and settings.adhesion.work > 0 else None

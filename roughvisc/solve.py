@@ -25,6 +25,7 @@ from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.problem import Problem
 from roughvisc.labels import CARRIED, TITLE, label
 from roughvisc.mechanics.grid import transform_library
+from roughvisc.settings import attraction
 from roughvisc.topography.grid import nominal_area
 from roughvisc.variables import STEP, STEPPED, VARIABLES
 from roughvisc.version import program_version
@@ -143,7 +144,8 @@ def solve(
     height, settings = problem.height, problem.settings
     # a curve of steady sliding does so itself
     loading = experiment if settings.grid_error and isinstance(experiment, Loading) else None
-    needed = ("pressure",) if loading and "pressure" not in settings.fields else ()
+    compared = ("pressure", "gap") if attraction(settings) is not None else ("pressure",)
+    needed = tuple(name for name in compared if loading and name not in settings.fields)
     problem = replace(problem, settings=replace(settings, fields=(*settings.fields, *needed)))
     bar: AbstractContextManager[Progress | None] = nullcontext(progress if callable(progress) else None)
     if progress is True:

@@ -19,7 +19,7 @@ from roughvisc.units import unit_for
 RESULT_FORMAT = 1
 
 #: How an accepted step ended; the values of ``status``, in order.
-STATUS_MEANINGS = ("converged", "open", "full_contact")
+STATUS_MEANINGS = ("converged", "open", "full_contact", "jump")
 
 #: Dimension of the kept times or speeds of cases that do not share them, and number of these in each case.
 ROW, ROWS = "row", "rows"
@@ -203,6 +203,8 @@ VARIABLES: dict[str, Variable] = {
         error="work_error",
         is_panel=True,
     ),
+    "adhesive_force": Variable(_STEPS, "N", "adhesive force", "integral of the tension, in contact cells too"),
+    "dissipated_energy": Variable(_STEPS, "J", "dissipated energy", "of jumps of an elastic body with adhesion"),
     # sliding
     "sliding_distance": Variable(
         _STEPS, "m", "sliding distance", "since the start, along the path, in whole cells", table="value"
@@ -325,6 +327,9 @@ VARIABLES: dict[str, Variable] = {
     "cycle": Variable(("cycle",), "1", "number of the loading cycle", "counted from 1", dtype="int64"),
     "cycle_start": Variable(("cycle",), "s", "time at which the cycle starts"),
     "cycle_work": Variable(("cycle",), "J", "work done by the force in the cycle"),
+    "pull_off_force": Variable(("cycle",), "N", "pull-off force", "largest tension in the cycle"),
+    "pull_off_time": Variable(("cycle",), "s", "time of the pull-off", "missing without tension"),
+    "work_of_separation": Variable(("cycle",), "J", "work of separation", "of the tension while the surfaces recede"),
     # observables: leakage
     "leak_rate": Variable(
         _SERIES,

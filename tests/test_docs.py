@@ -176,7 +176,7 @@ def test_study_files_page__has_every_key_with_its_meaning(docs_script):
         keys[table] = {key for key, *_ in rows}
     assert keys["study"] == {*TABLES, "sweep"}
     assert keys["material: temperature"] | keys["material: thickness"] == {*TEMPERATURE, *GEOMETRY}
-    assert keys["solve"] | keys["keep"] == {one.name for one in fields(Settings)} - {"missing"}
+    assert keys["solve"] | keys["keep"] == {one.name for one in fields(Settings)} - {"missing", "adhesion"}
     assert keys["observe"] == {*rv.observables.OBSERVABLES}
 
 

@@ -13,8 +13,8 @@ from roughvisc.study.case import read_cases, read_study, vary
 
 FOLDER = pathlib.Path(__file__).parents[1] / "workflows"
 #: But the map of extremes, whose script holds each case against its closed form, the seal, run by its script, the curve
-#: of friction, and the slide, where contact shrinks.
-APART = ("stability_map", "creeping_seal", "friction", "stop_and_go")
+#: of friction, the slide, where contact shrinks, and the tack, where it ends.
+APART = ("stability_map", "creeping_seal", "friction", "stop_and_go", "tack")
 STUDIES = sorted(path for path in FOLDER.glob("*.toml") if path.stem not in APART)
 
 

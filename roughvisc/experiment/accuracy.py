@@ -146,9 +146,9 @@ def error_columns(step: Step, scene: Scene) -> dict[str, float]:
     point, state, error = step.point, step.state, step.difference
     control = scene.program.segments[step.segment].control
     given, remembers = scene.program.prescribes[step.segment], not scene.memory.is_elastic
-    largest_force, largest_approach = max(state.kept_force, point.force), max(state.kept_approach, abs(point.approach))
+    largest_force, largest_approach = max(state.kept_force, point.size), max(state.kept_approach, abs(point.approach))
     series_error = scene.memory.series_error  # from the shortest known age on
-    loaded = max(state.largest_force, point.force, 1e-300)
+    loaded = max(state.largest_force, point.size, 1e-300)
     reached = max(state.largest_approach, abs(point.approach), 1e-300)
     age = point.time - scene.program.corners[step.segment]
     if age > 0 and scene.memory.early > 0:
@@ -165,12 +165,12 @@ def error_columns(step: Step, scene: Scene) -> dict[str, float]:
     work += (of_work * solved + series_error) * loaded * reached
     force = approach = 0.0
     if control == "approach" or not given:
-        force = error.force + solved * point.force + of_force
+        force = error.force + solved * point.size + of_force
     if control == "load" or not given:
         approach = error.approach + point.solver_error_approach + series_error * reached
         approach += INHERITED_APPROACH * state.solver_error * reached if remembers else 0.0
     stepped = error.pressure + error.shared
-    pressure = (stepped + solved * point.force + of_force) / largest_force if largest_force > 0 else solved
+    pressure = (stepped + solved * point.size + of_force) / largest_force if largest_force > 0 else solved
     per_force, per_approach = largest_force or math.inf, largest_approach or math.inf
     return {
         "time_error": max(stepped / per_force, error.force / per_force, error.approach / per_approach),
@@ -190,7 +190,7 @@ def uncertain_area(
     Parameters
     ----------
     pressure, gap : array, shape (nx, ny)
-        Pressure [Pa] and gap between the surfaces. [m]
+        Pressure in contact [Pa] and gap between the surfaces. [m]
     off : float
         Error of the pressure at the edge of contact. A contact cell of lower pressure may be open. [Pa]
     closed : float

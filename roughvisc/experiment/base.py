@@ -138,8 +138,8 @@ class Experiment(ABC):
         """Return the progress in words."""
 
     @abstractmethod
-    def unsupported(self, settings: Settings) -> Iterator[tuple[str, Any, str]]:
-        """Yield the settings that this experiment does not support: name, value and expected value."""
+    def unsupported(self, settings: Settings, body: Body) -> Iterator[tuple[str, Any, str]]:
+        """Yield the settings that this experiment does not support on a body: name, value and expected value."""
 
     def resolved(self, problem: Problem) -> Problem:
         """Return the problem that is computed: ``auto`` is replaced in boundary and grid error.
@@ -162,6 +162,12 @@ class Experiment(ABC):
             needs_pressure = self.axis == "time" and "pressure" not in settings.fields
             grid_error = fewest <= height.size <= most and not needs_pressure
         settings = replace(settings, boundary=boundary, grid_error=grid_error)
-        for name, value, expected in self.unsupported(settings):
+        for name, value, expected in self.unsupported(settings, problem.body):
             raise InputError(key=name, found=value, expected=expected)
-        return replace(problem, height=height, settings=settings)
+        problem = replace(problem, height=height, settings=settings)
+        self.check_cells(problem)
+        return problem
+
+    def check_cells(self, problem: Problem) -> None:
+        """Refuse a surface whose cells are too long for the problem."""
+        return

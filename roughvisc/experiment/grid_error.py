@@ -24,7 +24,7 @@ from roughvisc.errors import RoughviscError
 from roughvisc.experiment.accuracy import Stated
 from roughvisc.mechanics.contact.solver import neighbours
 from roughvisc.mechanics.grid import Boundary
-from roughvisc.topography.grid import cell_edges
+from roughvisc.topography.grid import cell_edges, spacing
 from roughvisc.topography.recipes import indenter_of, remade
 from roughvisc.topography.spectrum import resample, shares
 from roughvisc.variables import VARIABLES
@@ -146,6 +146,10 @@ def with_grid_error(
         columns = [VARIABLES["mean_contact_pressure"].grid_error, *map(_COLUMN.__getitem__, ("pressure", *histories))]
         return dataset.assign(dict.fromkeys(columns, missing))
     largest = {name: float(np.fmax.reduce(np.abs(dataset[name].values), initial=_ZERO)) for name in histories}
+    if "adhesive_force" in dataset:  # pressure and tension may cancel
+        cell_area = math.prod(spacing(height, "height"))
+        sizes = [float(np.nansum(np.abs(frame.values))) * cell_area for frame in dataset["pressure"]]
+        largest["force"] = max(largest["force"], *sizes)
     off = {name: np.abs(coarse[name].values - dataset[name].values) for name in histories}
     apart = {"pressure": pressure_distance(coarse, dataset) / largest["force"]}
     apart |= {name: off[name] / largest[name] for name in histories}
@@ -256,6 +260,8 @@ def _least_errors(
 
     pressure, height = dataset["pressure"].values[row], dataset["height"].values
     contact, present = pressure > 0, np.isfinite(height)
+    if "adhesive_force" in dataset:
+        contact, pressure = dataset["gap"].values[row] == 0, np.abs(pressure)
     if not contact.any():
         return least
     # Full contact on this grid may hide small openings.

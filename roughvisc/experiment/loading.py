@@ -32,7 +32,8 @@ from roughvisc.experiment.kept_times import kept_times
 from roughvisc.experiment.memory_limit import WORTH_ASKING, require_loading
 from roughvisc.experiment.problem import Problem
 from roughvisc.experiment.profile import BEYOND, GROWTH, Domain, Profile, choose_surface
-from roughvisc.mechanics.body import Body
+from roughvisc.mechanics.adhesion import Adhesion
+from roughvisc.mechanics.body import HALF_SPACE, Body
 from roughvisc.mechanics.contact.solver import contact_area
 from roughvisc.mechanics.grid import Grid, arrays_of, to_host
 from roughvisc.mechanics.memory import History
@@ -41,9 +42,10 @@ from roughvisc.mechanics.scene import SOFT, Packed, Point, Scene
 from roughvisc.mechanics.stated_error import Difference
 from roughvisc.mechanics.stepping import State, Step, march
 from roughvisc.mechanics.tangential import tangential_force
-from roughvisc.settings import Settings
+from roughvisc.settings import Settings, attraction
+from roughvisc.topography.grid import spacing
 from roughvisc.topography.recipes import grown
-from roughvisc.units import unit_for
+from roughvisc.units import format_quantity, unit_for
 from roughvisc.variables import STATUS_MEANINGS
 
 log = logging.getLogger("roughvisc")
@@ -53,6 +55,10 @@ Array = NDArray[np.float64]
 #: steps whose stated error is too small. With 1 instead of 0.5, a third more steps are kept, but 9 instead of 4 % of
 #: 185 random cases have a row beyond the tolerance.
 CHOSEN = 0.5
+#: Largest ratio of :func:`jump_ratio`. At 0.8 the pull-off of a sphere is 1.4 % off, at 3 it is 15 %.
+LARGEST_RATIO = 1.0
+#: Gap at the border of a free surface, in ranges, below which attraction beyond the border is missed.
+FELT = 5.0
 #: Times whose squares and products stay far from overflow. [s]
 LARGEST = 1e100
 #: A segment, or the period of a cycle, lasts at least this many units in the last place of its end: adding a millionth
@@ -138,6 +144,7 @@ class Loading(Experiment):
             tolerance=settings.tolerance,
             time_step=None if isinstance(settings.time_step, str) else settings.time_step,
             present=None if profile.all_present else xp.asarray(profile.present[domain.cells]),
+            adhesion=attraction(settings),
         )
         return LoadingRows(
             problem=replace(problem, height=profile.height),
@@ -150,14 +157,45 @@ class Loading(Experiment):
             state=on_device(state, xp) if state else LoadingState(enlarged=enlarged),
         )
 
-    def unsupported(self, settings: Settings) -> Iterator[tuple[str, Any, str]]:
-        """Yield the settings that do not fit the program: name, value and expected value."""
+    def unsupported(self, settings: Settings, body: Body) -> Iterator[tuple[str, Any, str]]:
+        """Yield the settings that do not fit the program or the body: name, value and expected value."""
         if self.program.slides and settings.boundary != "periodic":
             yield "boundary", settings.boundary, "'periodic' for a program that slides (rv.mirror unfolds a surface)"
         end = self.program.duration
         if not isinstance(settings.time_step, str) and settings.time_step < 4 * math.ulp(end):
             resolution = f"at the end of the program, {end:g} s, times have a resolution of {math.ulp(end):.2g} s"
             yield "time_step", settings.time_step, f"a longer step: {resolution}"
+        if attraction(settings) is None:
+            if self.program.lowest_load < 0:
+                yield "program", self.program.lowest_load, "loads and pressures of at least zero, or adhesion"
+            return
+        if self.program.slides:
+            yield "adhesion", settings.adhesion, "no adhesion in a program that slides"
+        if body.kernel != HALF_SPACE:
+            yield "adhesion", settings.adhesion, "no adhesion on a sheet, on layers or on a kernel of your own"
+        if settings.device != "cpu":
+            yield "device", settings.device, "'cpu' for adhesion"
+
+    def check_cells(self, problem: Problem) -> None:
+        """Refuse cells that do not resolve the range of an attraction: single cells would jump.
+
+        Raises
+        ------
+        InputError
+            If the cells are too long. The message states the length that fits.
+        """
+        attracts = attraction(problem.settings)
+        if attracts is None:
+            return
+        sides = spacing(problem.height, "height")
+        ratio = jump_ratio(attracts, problem.body, sides, self.program.duration)
+        if ratio > LARGEST_RATIO:
+            fits = format_quantity(float(f"{max(sides) / ratio:.2g}"), "m")
+            cells = [math.ceil(count * ratio) for count in problem.height.shape]
+            least = format_quantity(float(f"{attracts.range * math.sqrt(ratio):.3g}"), "m")
+            shown = f"resample = {cells} under [surface], rv.resample in Python"
+            expected = f"a range of at least {least}, or cells of at most {fits} ({shown}): the cells do not resolve it"
+            raise InputError(key="adhesion.range", found=attracts.range, expected=expected)
 
     def facts(self, body: Body, height: xr.DataArray) -> dict[str, Any]:
         """Return facts about the body at the end of the program, and the time scale of the program."""
@@ -218,6 +256,8 @@ class LoadingRows(Rows):
             point = step.point
             if is_free and not point.is_open:
                 touches = point.contact
+                if scene.adhesion is not None and point.gap is not None:
+                    touches = point.gap < FELT * scene.adhesion.range
                 at_border = bool(touches[[0, -1]].any() or touches[:, [0, -1]].any())
                 if (at_border and not domain.is_whole) or BEYOND * point.approach >= domain.outside:
                     raise Outgrown(LoadingState(enlarged=self.state.enlarged, outgrown=self.state.outgrown + 1))
@@ -229,6 +269,7 @@ class LoadingRows(Rows):
             if every:  # the length of fixed steps and of steps in a slide cannot be reduced
                 is_given = scene.time_step is not None or scene.program.segments[step.segment].slide is not None
                 kept = point.time in ends or is_given or stated["stated_error"] <= CHOSEN * scene.tolerance
+            jumps = step.state.dissipated > (self.state.march.dissipated if self.state.march else 0.0)
             values: dict[str, Any] = {}
             fields: dict[str, Array] = {}
             if step.is_end:
@@ -240,7 +281,7 @@ class LoadingRows(Rows):
                 point.time - (point.previous[0] if point.previous else scene.program.corners[step.segment]), 0.0
             )
             if kept or (not every and (by_load or not scene.memory.grows(length, SOFT))):
-                values, fields = self._row(step, length, stated, kept)
+                values, fields = self._row(step, length, stated, kept, jumps)
             yield Row(point.time, values, fields, kept, self.state if step.is_end else None, point.time)
             del fields  # frees their memory while the next step is computed
 
@@ -259,7 +300,7 @@ class LoadingRows(Rows):
         )
 
     def _row(
-        self, step: Step, length: float, stated: dict[str, float], kept: bool
+        self, step: Step, length: float, stated: dict[str, float], kept: bool, jumps: bool
     ) -> tuple[dict[str, Any], dict[str, Array]]:
         """Return the variables of a step, and its fields on the whole surface.
 
@@ -273,6 +314,8 @@ class LoadingRows(Rows):
             Its stated errors.
         kept : bool
             Whether the step is a row of the result; otherwise it belongs only to the history of all steps.
+        jumps : bool
+            Whether the contact of an elastic body with adhesion jumps to another state in the step.
         """
         scene, profile, domain, point = self.scene, self.profile, self.domain, step.point
         grid, present, is_whole, xp = scene.grid, scene.present, domain.is_whole, scene.grid.xp
@@ -288,7 +331,8 @@ class LoadingRows(Rows):
         counted, area, _ = contact_area(contact, free, grid.cell_area, grid.boundary, goes_on)
 
         is_full = is_whole and not bool(free.any())
-        status = "open" if point.is_open else "full_contact" if is_full else "converged"
+        status = "open" if not contact.any() else "full_contact" if is_full else "converged"
+        status = "jump" if jumps else status
         if is_whole:
             mean_gap = float(gap[scene.solid].mean())
         else:
@@ -310,6 +354,11 @@ class LoadingRows(Rows):
             "contact_area_counted": counted,
             "mean_gap": mean_gap,
         }
+        if scene.adhesion is not None:
+            tension = scene.adhesion.strength * xp.exp(-gap[scene.solid] / scene.adhesion.range)
+            row["adhesive_force"] = float(tension.sum()) * grid.cell_area
+            if scene.memory.is_elastic:
+                row["dissipated_energy"] = step.state.dissipated
         if slide is not None:
             row["sliding_distance"] = step.state.distance
             row["friction_force_across"] = tangential_force(grid, pressure, displaced[0], slide, across=True)
@@ -350,9 +399,10 @@ class LoadingRows(Rows):
         scene, point, difference = self.scene, step.point, step.difference
         inside, outside = 0.0, 0.0
         if counted > 0 and point.solver_error > 0:
-            off = SOLVER_AT_EDGE * point.solver_error * point.force / counted
+            off = SOLVER_AT_EDGE * point.solver_error * point.size / counted
             closed = off * scene.grid.self_influence * scene.memory.compliance(length)
-            inside, outside = uncertain_area(point.pressure, gap, off, closed, scene.grid.cell_area, scene.present)
+            pressure = scene.contact_pressure(point, point.pressure)
+            inside, outside = uncertain_area(pressure, gap, off, closed, scene.grid.cell_area, scene.present)
         return area_error(counted, area, difference.inside + inside, difference.outside + outside)
 
     def finish(self, dataset: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
@@ -389,9 +439,33 @@ class LoadingRows(Rows):
                 f"{limit:g} (memory): no passive material comes nearer to it."
             )
         attributes: dict[str, Any] = {"memory": memory.note, "series_error": memory.series_error}
+        if scene.adhesion is not None:
+            attributes |= {"work_of_adhesion": scene.adhesion.work, "range_of_adhesion": scene.adhesion.range}
         if cycles := program.cycles:  # for the work in each cycle
             attributes["cycles"] = json.dumps(cycles)
         return dataset.assign_attrs(attributes), warnings
+
+
+def jump_ratio(attracts: Adhesion, body: Body, sides: tuple[float, float], age: float) -> float:
+    r"""Return the ratio from which single cells may jump into and out of contact.
+
+    A cell that is pulled by the tension has two stable states if the tension falls faster with the gap than the cell
+    springs back: if :math:`C w K_0 / \rho^2 > 1`, with the contact compliance :math:`C`, the work of adhesion
+    :math:`w`, its range :math:`\rho`, and the displacement :math:`K_0` of a cell under unit pressure on it.
+
+    Parameters
+    ----------
+    attracts : Adhesion
+        Attraction.
+    body : Body
+        The body.
+    sides : tuple of float
+        Cell sides. [m]
+    age : float
+        Time since the start, at which the compliance is taken. [s]
+    """
+    response = float(body.kernel.influence((1, 1), sides)[0, 0])
+    return float(body.material.contact_compliance(age)) * attracts.work * response / attracts.range**2
 
 
 def on_device(value: Any, xp: Any) -> Any:

@@ -20,7 +20,7 @@ from roughvisc.mechanics.memory import LayerMemory, Memory
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.scene import SOFT
 from roughvisc.mechanics.stepping import PACKED_FROM
-from roughvisc.settings import Settings
+from roughvisc.settings import Settings, attraction
 from roughvisc.topography.grid import counts
 from roughvisc.units import format_quantity
 
@@ -96,6 +96,8 @@ _SPECTRUM = {"periodic": 1.1, "mirror": 1.1, "free": 4.2}
 #: Fields of a friction curve, measured at 256 x 250: operators, Newton's steps, the vectors of GMRES that are in use; a
 #: GPU holds all 61.
 _CURVE = {"cpu": 27.0, "gpu": 82.0}
+#: Fields of a contact with adhesion, whose unknowns are all points of the transforms (measured at 256 x 256).
+_ADHESIVE = {"periodic": 20.0, "mirror": 21.0, "free": 70.0}
 #: Contact fraction below which a contact is sparse.
 SPARSE = 0.05
 
@@ -138,7 +140,10 @@ def march_bytes(
     crept = memory.glassy + float(memory.compliances[np.isfinite(memory.times)].sum())
     solutions, copies = _ELASTIC if memory.is_elastic else _SOFT_PAIR if crept >= SOFT * memory.glassy else _PAIR
     solved = _SOLVE + _TRANSFORMS[settings.boundary] * _PLANS[settings.device] + _IN_CONTACT * contact
-    is_packed = part * cells >= PACKED_FROM and contact < 0.5  # a pressure takes 18 bytes per contact cell (measured)
+    if attraction(settings) is not None:
+        solved += _ADHESIVE[settings.boundary]
+    can_pack = attraction(settings) is None and part * cells >= PACKED_FROM
+    is_packed = can_pack and contact < 0.5  # a pressure takes 18 bytes per contact cell (measured)
     solved += solutions * ((2.25 * contact if is_packed else 1.0) + kept) + copies * kept * exponentials
     if layered:
         solved += 0.5 * kept * (exponentials + 1)  # symbols
@@ -171,7 +176,7 @@ def require_loading(shape: tuple[int, int], program: Program, settings: Settings
     times = program.segments if settings.times is None else settings.times  # one row for each segment, or more
     rows = times if isinstance(times, int) else len(times)
     rows = rows if in_memory and settings.device == "cpu" else 0  # kept fields are on the host
-    is_free = settings.boundary == "free" and settings.edge == "error"
+    is_free = settings.boundary == "free" and settings.edge == "error" and attraction(settings) is None
     part = 0.0 if is_free and not body.kernel.raises_surface else 1.0  # the domain is not known yet
     require_memory(shape, partial(march_bytes, settings, memory, rows=rows, part=part), settings.device)
 

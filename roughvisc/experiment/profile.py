@@ -24,7 +24,7 @@ from roughvisc.mechanics.body import HALF_SPACE, Kernel
 from roughvisc.mechanics.contact.solver import solve_contact
 from roughvisc.mechanics.grid import Grid
 from roughvisc.mechanics.program import Program
-from roughvisc.settings import Missing, Settings
+from roughvisc.settings import Missing, Settings, attraction
 from roughvisc.topography.grid import spacing
 from roughvisc.topography.recipes import grown, indenter_of
 
@@ -220,6 +220,7 @@ def choose_surface(
     shape = profile.gap.shape[0], profile.gap.shape[1]
     domain = Domain((slice(None), slice(None)), shape, profile.spacing, math.inf, profile.kernel)
     can_crop = not body.kernel.raises_surface and profile.all_present and min(shape) >= WORTH_CROPPING
+    can_crop = can_crop and attraction(settings) is None  # tension raises the surface, and acts outside the contact
     if can_crop and math.isfinite(estimate.approach):
         domain = cropped(domain, profile, estimate, GROWTH**outgrown)
     return profile, domain, times, estimate.at_border

@@ -139,7 +139,7 @@ class SteadySliding(Experiment):
             problem = replace(problem, height=mirror(problem.height), settings=settings)
         return SlidingRows(problem, self, state or 0)
 
-    def unsupported(self, settings: Settings) -> Iterator[tuple[str, Any, str]]:
+    def unsupported(self, settings: Settings, body: Body) -> Iterator[tuple[str, Any, str]]:
         """Yield the settings that steady sliding does not support: name, value and expected value."""
         if settings.boundary not in ("periodic", "mirror"):
             yield "boundary", settings.boundary, "'periodic' or 'mirror', because steady sliding repeats"

@@ -171,8 +171,10 @@ class Scene:
         return float(self.fullest["force"])
 
     def pressure_in(self, row: xr.Dataset) -> Array:
-        """Return the pressure in a row with contact, zero at missing points. [Pa]"""
-        pressure = np.nan_to_num(row["pressure"].transpose("x", "y").values) if "pressure" in row else np.zeros(1)
+        """Return the pressure in a row with contact, zero at missing points and under tension. [Pa]"""
+        pressure = (
+            np.nan_to_num(row["pressure"].transpose("x", "y").values).clip(0) if "pressure" in row else np.zeros(1)
+        )
         if not pressure.any():
             raise NotKnown('Keep the pressure, fields = ["pressure"].')
         return pressure
@@ -272,6 +274,9 @@ def adhesion(scene: Scene) -> Found:
 
     Each spot of radius ``R`` holds :math:`\frac32 \pi w R` (JKR). A stiff and small one holds up to a third more (DMT).
     """
+    if "range_of_adhesion" in scene.dataset.attrs:
+        w, reach = (scene.dataset.attrs[f"{name}_of_adhesion"] for name in ("work", "range"))
+        return 0.0, f"Modelled: {as_text(w, 'J/m^2', 3)} with a range of {as_text(reach, 'm', 3)}."
     force, curvature, fraction = scene.force, scene.curvature, float(scene.fullest["contact_fraction"])
     if scene.boundary != "free" and fraction > _MERGED:
         raise NotKnown(f"{percent(fraction)} of the area is in contact, without separate spots.")

@@ -297,6 +297,16 @@ class Grid:
         found = self._transforms.waves_back(spectrum, self.points)
         return self.xp.ascontiguousarray(found[: self.shape[0], : self.shape[1]])
 
+    def filtered(self, field: Array, factors: Array) -> Array:
+        """Return a field on all points of the transforms, each wave multiplied by a factor: one convolution."""
+        self.convolutions += 1
+        fft = self._transforms
+        if self.boundary == "mirror":
+            return fft.cosines_back(fft.cosines(field) * factors)
+        spectrum = fft.waves(field)
+        spectrum *= factors
+        return fft.waves_back(spectrum, self.points)
+
     def turn(self, cells: int, axis: int) -> Array:
         """Return the factors of the transform of a periodic field for a shift of the field back by `cells`."""
         count = self.shape[axis]

@@ -84,7 +84,7 @@ def instant(began: float, end: float, taken: int, cells: int) -> float:
 Control = Literal["load", "approach", "pressure"]
 #: Controlled quantity -> its unit.
 UNITS: dict[str, str] = {"load": "N", "approach": "m", "pressure": "Pa"}
-#: Least value of the quantities that are never negative in contact without adhesion.
+#: Least value of the quantities that are negative only in contact with adhesion.
 LEAST = {"load": 0.0, "pressure": 0.0}
 
 
@@ -215,7 +215,7 @@ class Program:
 
     def _to(self, control: Control, value: Any, over: Any) -> Program:
         """Ramp linearly to a value of a controlled quantity."""
-        end = number(value, UNITS[control], control, least=LEAST.get(control))
+        end = number(value, UNITS[control], control)
         return self + Program((Segment(control, number(over, "s", "over", least=0), end),))
 
     def __add__(self, other: Program) -> Program:
@@ -228,7 +228,7 @@ class Program:
         Parameters
         ----------
         value : float or str
-            Load at the end. [N]
+            Load at the end; negative only with adhesion. [N]
         over : float or str
             Duration of the ramp; zero is a jump. [s]
 
@@ -239,7 +239,7 @@ class Program:
         Raises
         ------
         InputError
-            If a quantity is negative, not finite or of another kind, in the words of a study file.
+            If a quantity is not finite or of another kind, or the time is negative, in the words of a study file.
 
         Examples
         --------
@@ -256,7 +256,7 @@ class Program:
         Parameters
         ----------
         value : float or str
-            Nominal pressure at the end. [Pa]
+            Nominal pressure at the end; negative only with adhesion. [Pa]
         over : float or str
             Duration of the ramp; zero is a jump. [s]
 
@@ -267,7 +267,7 @@ class Program:
         Raises
         ------
         InputError
-            If a quantity is negative, not finite or of another kind, in the words of a study file.
+            If a quantity is not finite or of another kind, or the time is negative, in the words of a study file.
 
         Examples
         --------
@@ -410,7 +410,7 @@ class Program:
             expected = f"as many values as times, {len(times)}, at least one"
             raise InputError(key="values", found=len(values), expected=expected)
         instants = [number(time, "s", f"times.{row}") for row, time in enumerate(times)]
-        ends = [number(value, unit, f"values.{row}", least=LEAST.get(control)) for row, value in enumerate(values)]
+        ends = [number(value, unit, f"values.{row}") for row, value in enumerate(values)]
         if instants[0] != 0:
             raise InputError(key="times.0", found=times[0], expected="zero")
         segments = []
@@ -450,7 +450,7 @@ class Program:
         Raises
         ------
         InputError
-            If a quantity has a wrong type or unit, or load or pressure become negative.
+            If a quantity has a wrong type or unit.
 
         Examples
         --------
@@ -458,10 +458,8 @@ class Program:
         10.1
         """
         unit = UNITS[one_of("control", control, UNITS)]
-        middle = number(mean, unit, "mean", least=LEAST.get(control))
+        middle = number(mean, unit, "mean")
         height = number(amplitude, unit, "amplitude")
-        if control in LEAST and abs(height) > middle:
-            raise InputError(key="amplitude", found=amplitude, expected=f"at most the mean, {mean!r}")
         length = number(period, "s", "period", above=0)
         duration = number(length * number(cycles, "1", "cycles", above=0, most=1e6), "s", "cycles")
         return self + Program((Segment(control, 0.0, middle), Segment(control, duration, middle, height, length)))
@@ -486,6 +484,11 @@ class Program:
                 one = replace(one, control="load", end=end, amplitude=float(f"{one.amplitude * size:.15g}"))
             segments.append(one)
         return self if tuple(segments) == self.segments else replace(self, segments=tuple(segments))
+
+    @cached_property
+    def lowest_load(self) -> float:
+        """Lowest load [N] or nominal pressure [Pa] prescribed anywhere, at most zero."""
+        return min([0.0, *((one.end or 0.0) - abs(one.amplitude) for one in self.segments if one.control in LEAST)])
 
     @cached_property
     def slides(self) -> bool:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from roughvisc.mechanics.adhesion import Adhesion
 from roughvisc.mechanics.grid import Grid, namespace, to_host
 from roughvisc.mechanics.memory import History, Memory
 from roughvisc.mechanics.program import Program, Slide
@@ -70,6 +71,8 @@ class Scene:
         Fixed step; None: the tolerance controls the steps. [s]
     present : array of bool or None
         Cells with material; None: all.
+    adhesion : Adhesion or None
+        Attraction of the surfaces; None: none.
     solid : array of bool or ellipsis
         Index of the cells with material.
     can_jump : bool
@@ -90,6 +93,7 @@ class Scene:
     tolerance: float = 1e-3
     time_step: float | None = None
     present: Array | None = None
+    adhesion: Adhesion | None = None
     solid: Any = field(init=False)
     can_jump: bool = field(init=False)
     is_soft: bool = field(init=False)
@@ -107,6 +111,17 @@ class Scene:
         for segment in self.program.segments:
             motion = segment.slide or motion
             self.motions.append(motion)
+
+    @property
+    def least_force(self) -> float:
+        """Force to which errors are relative at least: with adhesion the largest tension of a cell. [N]"""
+        return 1e-300 if self.adhesion is None else self.adhesion.strength * self.grid.cell_area
+
+    def contact_pressure(self, point: Point, pressure: Array) -> Array:
+        """Return the pressure of a point [Pa] in contact, zero elsewhere: with adhesion without the tension there."""
+        if self.adhesion is None:
+            return pressure
+        return (pressure + self.adhesion.strength) * (0.0 if point.gap is None else point.gap == 0)
 
     def keeps(self, time: float) -> bool:
         """Return whether a time is kept. [s]"""
@@ -183,6 +198,12 @@ class Point:
         Whether the prescribed value has jumped and the body has no instantaneous compliance.
     solver_error, solver_error_approach : float
         Errors of the contact solver: relative error of the pressure (L1 norm), and error of the approach. [-, m]
+    gap : array, shape (nx, ny), or None
+        With adhesion, gap between the surfaces: exactly zero in contact, infinite at absent cells. [m]
+    integral : float or None
+        With adhesion, integral of the absolute pressure. [N]
+    is_unstable : bool
+        With adhesion, whether the state before may have been unstable.
     """
 
     time: float
@@ -195,6 +216,9 @@ class Point:
     is_late: bool = False
     solver_error: float = 0.0
     solver_error_approach: float = 0.0
+    gap: Array | None = None
+    integral: float | None = None
+    is_unstable: bool = False
 
     @property
     def pressure(self) -> Array:
@@ -204,9 +228,14 @@ class Point:
     @property
     def contact(self) -> Array:
         """Cells in contact, shape (nx, ny), bool."""
-        return self.pressure > 0
+        return self.pressure > 0 if self.gap is None else self.gap == 0
+
+    @property
+    def size(self) -> float:
+        """Force to which errors are relative: with adhesion the integral of the absolute pressure. [N]"""
+        return self.force if self.integral is None else self.integral
 
     @property
     def is_open(self) -> bool:
-        """Whether the surfaces do not touch."""
-        return self.force == 0
+        """Whether no force acts between the surfaces. With adhesion a force acts at every gap."""
+        return self.force == 0 and self.gap is None

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from roughvisc.mechanics.adhesive_step import dissipated, stored_energy
 from roughvisc.mechanics.grid import fft_of
 from roughvisc.mechanics.memory import STIFF, LayerMemory, Memory
 from roughvisc.mechanics.program import Slide
@@ -145,6 +146,7 @@ def difference(
         return error
     gap = scene.gap + scene.memory.displacement(fine.history)[0] - fine.approach
     gap_of_coarse = scene.gap + scene.memory.displacement(coarse.history)[0] - coarse.approach
+    pressure, other = scene.contact_pressure(fine, pressure), scene.contact_pressure(coarse, other)
     contact = fine.contact
     inside = contact & (pressure <= abs(pressure - other))
     outside = ~contact & (coarse.contact | (gap <= abs(gap - gap_of_coarse)))
@@ -152,7 +154,7 @@ def difference(
         outside &= scene.present
     cells, uncertain = int(contact.sum()), 0.0
     if cells and scene.memory.grows(fine.time - before.time, SOFT):
-        uncertain = entering(scene, before, fine) + ENTERING * float(outside.sum()) * fine.force / cells
+        uncertain = entering(scene, before, fine) + ENTERING * float(outside.sum()) * fine.size / cells
     return replace(
         error,
         pressure=error.pressure + uncertain,
@@ -176,7 +178,7 @@ def entered_early(scene: Scene, before: Point, after: Point) -> float:
 
 def force_of_entered(scene: Scene, before: Point, after: Point) -> float:
     """Return the force on the cells that have entered between two points. [N]"""
-    return float(after.pressure[~before.contact].sum()) * scene.grid.cell_area
+    return float(scene.contact_pressure(after, after.pressure)[~before.contact].sum()) * scene.grid.cell_area
 
 
 # ---------------------------------------------------------------------------------------------------------- friction
@@ -295,7 +297,8 @@ def work_of_pair(
         is_curved = is_over_time or float(slopes[0] * (slopes[0] + 2 * bends[0] * last)) > 0
     if not is_curved:
         forces = [float(begin[0]), first.force, end.force]
-        uncertain = UNBOUNDED * (1 - min(forces) / max(*forces, 1e-300))
+        sizes = [abs(force) for force in forces]
+        uncertain = UNBOUNDED * (1 - min(sizes) / max(*sizes, 1e-300))
         path = [start, *points]
         works = np.cumsum([work_of_step(scene, *ends) for ends in zip(path, points, strict=False)]).tolist()
         return works, uncertain * abs(straight[0]), uncertain * abs(straight[1])
@@ -395,9 +398,8 @@ def work_of_step(scene: Scene, before: Point, after: Point, slides: bool = False
     """
     memory = scene.memory
     if after.time == before.time or (memory.is_elastic and not slides):
-        first = float((before.pressure * memory.displacement(before.history, 0.0)[0]).sum())
-        last = float((after.pressure * memory.displacement(after.history, 0.0)[0]).sum())
-        return 0.5 * last * scene.grid.cell_area - 0.5 * first * scene.grid.cell_area
+        lost = 0.0 if scene.adhesion is None else dissipated(scene, before, after)
+        return stored_energy(scene, after) - stored_energy(scene, before) + lost
     force = after.force if before.is_late else before.force
     return 0.5 * (force + after.force) * (touch(scene, after) - touch(scene, before))
 

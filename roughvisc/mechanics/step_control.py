@@ -204,7 +204,7 @@ def errors_over_allowed(
         Whether the pair contains a kept row.
     """
     second, taken, memory = pair.second, pair.length, scene.memory
-    force = max(largest[0], pair.first.force, second.force, 1e-300)
+    force = max(largest[0], pair.first.size, second.size, scene.least_force)
     rounding = ROUNDING * memory.compliance(second.time) * scene.grid.largest_eigenvalue * force / scene.gap.size
     approach = max(largest[1], abs(pair.first.approach), abs(second.approach), rounding / scene.grid.cell_area, 1e-300)
 
@@ -215,7 +215,7 @@ def errors_over_allowed(
 
     following = second.time if lands else min(scene.next_kept(second.time), scene.program.duration)
     ahead = growth_until(scene, number, second, following)
-    scales = max(force, second.force * ahead), max(approach, abs(second.approach) * ahead**0.5)
+    scales = max(force, second.size * ahead), max(approach, abs(second.approach) * ahead**0.5)
     part = ALLOWED_SOFT if scene.is_soft else ALLOWED
     return added(scene, pair, number, following, scales) / (part * scene.tolerance), row
 

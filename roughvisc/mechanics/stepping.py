@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from roughvisc.errors import ConvergenceError, InputError
+from roughvisc.mechanics.adhesive_step import JUMP, dissipated, longest_step, step_with_adhesion
 from roughvisc.mechanics.contact.solver import solve_contact
 from roughvisc.mechanics.memory import STIFF, Rule
 from roughvisc.mechanics.program import Segment, Slide, instant
@@ -101,6 +102,8 @@ class State:
         Error of the quadrature of the work: root of the sum of the squares of all pairs. [J]
     work_relaxed : float
         Error of the work due to forces that relax within the first step after a corner: sum over all corners. [J]
+    dissipated : float
+        Energy that jumps of an elastic body with adhesion have dissipated so far. [J]
     distance : float
         Length of the path of the slides so far. [m]
     convolutions : int
@@ -121,6 +124,7 @@ class State:
     work_difference: float = 0.0
     work_curved: float = 0.0
     work_relaxed: float = 0.0
+    dissipated: float = 0.0
     distance: float = 0.0
     convolutions: int = 0
 
@@ -179,8 +183,11 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
         given = bool(segments) and segments[0].control == "approach"
         approach = 0.0 if given else float(scene.gap[scene.solid].min())
         state = State(Point(0.0, nothing, 0.0, approach, scene.memory.start(nothing)))
+        if scene.adhesion is not None:
+            state = attracted(scene, state)
         if segments and segments[0].duration > 0:
-            state = replace(state, kept_approach=abs(approach) if scene.keeps(0.0) else 0.0)
+            if scene.keeps(0.0):
+                state = replace(state, kept_force=state.fine.size, kept_approach=abs(state.fine.approach))
             yield Step(state.fine, state.difference, 0, state)
     scene.grid.convolutions = state.convolutions
     while state.segment < len(segments):
@@ -221,7 +228,7 @@ def with_largest_kept(scene: Scene, state: State, steps: list[Step]) -> list[Ste
     force, approach, counted = state.kept_force, state.kept_approach, list[Step]()
     for step in steps:
         if scene.keeps(step.point.time):
-            force, approach = max(force, step.point.force), max(approach, abs(step.point.approach))
+            force, approach = max(force, step.point.size), max(approach, abs(step.point.approach))
         counted.append(step._replace(state=replace(step.state, kept_force=force, kept_approach=approach)))
     return counted
 
@@ -280,6 +287,42 @@ def single_step(scene: Scene, state: State, time: float) -> Step:
     return Step(new, error, number, after)
 
 
+def attracted(scene: Scene, state: State) -> State:
+    """Return the state at the start with adhesion: the surfaces attract each other as soon as the body can deform."""
+    segments, point, xp = scene.program.segments, state.fine, scene.grid.xp
+    approach = point.approach
+    if segments and segments[0].control == "approach":
+        approach = scene.program.prescribed(0, 0.0, 0.0)
+    gap = xp.maximum(scene.gap - approach, 0.0)
+    if scene.present is not None:
+        gap[~scene.present] = math.inf
+    state = replace(state, fine=replace(point, gap=gap, integral=0.0))
+    if not scene.can_jump or not segments or segments[0].duration == 0:
+        return state
+    scene.grid.convolutions = 0
+    after = single_step(scene, state, 0.0).state
+    lost = max(-after.work, 0.0) if scene.memory.is_elastic else 0.0  # the approach does not change
+    return replace(after, segment=0, work=0.0, dissipated=lost)
+
+
+def step_on_path(scene: Scene, state: State, segment: Segment, event: float) -> Step:
+    """Return a step of an elastic body with adhesion to an event at most [s]; the step of a jump is short."""
+    fine, is_refused = state.fine, False
+    longest = min(longest_step(scene, segment, fine.start), event - fine.time)
+    length = min(state.next_length or longest, longest)
+    while True:
+        parts = max(math.ceil((event - fine.time) / length * (1 - ROUNDED)), 1)
+        step = single_step(scene, state, fine.time + (event - fine.time) / parts if parts > 1 else event)
+        taken, lost = step.point.time - fine.time, dissipated(scene, fine, step.point)
+        if lost == 0 or taken <= JUMP * longest * (1 + ROUNDED):
+            break
+        length, is_refused = taken / 2, True
+    following = 0.0 if lost > 0 else taken / 2 if is_refused else 2 * taken
+    total = state.dissipated + lost
+    after = replace(step.state, dissipated=total, next_length=0.0 if step.state.segment > state.segment else following)
+    return step._replace(state=after)
+
+
 def step_while_open(scene: Scene, state: State, closes: float) -> Step:
     """Return a step between open surfaces, to the time at which they touch. [s]
 
@@ -304,6 +347,8 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         if closes > fine.time:
             return [step_while_open(scene, state, closes)]
     if scene.memory.is_elastic:
+        if scene.adhesion is not None and scene.time_step is None:
+            return [step_on_path(scene, state, segment, event)]
         longest = (end - began) / 20 if scene.kept is None else math.inf
         parts = max(math.ceil((event - fine.time) / (scene.time_step or longest) * (1 - ROUNDED)), 1)
         return [single_step(scene, state, fine.time + (event - fine.time) / parts if parts > 1 else event)]
@@ -484,7 +529,7 @@ def after_steps(
         fine=fine,
         twice=None if coarse is fine else replace(coarse, previous=None),  # the coarse solution does not extrapolate
         next_length=next_length,
-        largest_force=max(state.largest_force, points[0].force, fine.force),
+        largest_force=max(state.largest_force, points[0].size, fine.size),
         largest_approach=max(state.largest_approach, abs(points[0].approach), abs(fine.approach)),
         solver_error=max(state.solver_error, *(point.solver_error for point in points), coarse.solver_error),
         work_difference=state.work_difference + of_work,
@@ -607,7 +652,7 @@ def take_step(
     lowest = float(gap[scene.solid].min())
     common = here.history.fields[0] if prediction.grid is None else None  # displacement per unit compliance
     previous = (here.time, here.stored_pressure, common) if step > 0 and not here.is_late else None
-    if (value == 0) if by_load else (value <= lowest):
+    if scene.adhesion is None and ((value == 0) if by_load else (value <= lowest)):
         nothing = grid.xp.zeros(gap.shape)
         history = memory.advance(here.history, prediction, nothing, nothing)
         return Point(time, nothing, 0.0, lowest if by_load else value, history, previous, here.start)
@@ -618,6 +663,11 @@ def take_step(
         ratio = step / (here.time - then)
         pressure = pressure + ratio * (pressure - replace(here, stored_pressure=stored).pressure)
         unit = None if unit is None or pressure.min() < 0 else unit + ratio * (unit - former_unit)
+    tolerance = max(solver_part * scene.tolerance, 1e-10)
+    if scene.adhesion is not None:
+        return step_with_adhesion(
+            scene, here, time, value, prediction, gap, pressure, previous, tolerance, by_load=by_load
+        )
     start = dict[str, Any]()
     if guess or not here.is_open:  # otherwise the first guess would be zero
         pressure = alpha * pressure
@@ -625,7 +675,6 @@ def take_step(
         start = {"start": pressure, "start_displacement": unit}
     del pressure, unit
     given: dict[str, Any] = {"load": value * alpha / area} if by_load else {"approach": value}
-    tolerance = max(solver_part * scene.tolerance, 1e-10)
     try:
         found = solve_contact(grid, gap, tolerance=tolerance, **start, **given, overwrite=True, present=scene.present)
     except ConvergenceError as error:

@@ -14,6 +14,7 @@ import xarray as xr
 
 from roughvisc.observables.contact import closure, clusters, conductance, contact, distribution, leakage
 from roughvisc.observables.history import cycle_work, history
+from roughvisc.observables.sticking import pull_off
 from roughvisc.observables.theory import area_by_theory, persson
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "history",
     "leakage",
     "persson",
+    "pull_off",
 ]
 
 

@@ -26,10 +26,12 @@ _UNITS: dict[str, str] = {"thermal": "K m/W", "electrical": "ohm m"}
 def contact(dataset: xr.Dataset) -> xr.DataArray:
     """Return the mask of cells in contact: cells with pressure or, if pressure is not stored, cells without a gap.
 
+    With adhesion, contact cells may be under tension, as open cells are: contact follows from the gap.
+
     Parameters
     ----------
     dataset : xarray.Dataset
-        A result with ``pressure`` or ``gap``.
+        A result with ``pressure`` or ``gap``; with adhesion a result with ``gap``.
 
     Returns
     -------
@@ -41,7 +43,7 @@ def contact(dataset: xr.Dataset) -> xr.DataArray:
     InputError
         If the result contains neither ``pressure`` nor ``gap``.
     """
-    name = "pressure" if "pressure" in dataset else "gap"
+    name = "pressure" if "pressure" in dataset and "adhesive_force" not in dataset else "gap"
     need(dataset, name)
     field = by_frame(dataset[name]).drop_attrs(deep=False)
     return field > 0 if name == "pressure" else field <= 0

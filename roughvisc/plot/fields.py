@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
 import xarray as xr
 from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm, Normalize
+from matplotlib.colors import LogNorm, Normalize, TwoSlopeNorm
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import Patch
@@ -41,6 +41,8 @@ LOOK = {
     "flux": ("cividis_r", "max", style.NO_CONTACT, "below 0.1 % of the scale"),
     "height": ("cividis", "mean", None, ""),
 }
+#: Colour map of a pressure that is negative in some cells: tension blue, pressure red.
+SIGNED = "RdBu_r"
 #: Largest number of drawn cells along the longer side, and of times or speeds in one figure.
 MOST_CELLS, _MOST_FRAMES = 1024, 8
 #: Flux that stands for zero. [m^2/s]
@@ -133,7 +135,11 @@ def drawn(field: xr.DataArray, cells: int | None = None) -> xr.DataArray:
     if every > 1:
         blocks = field.coarsen(x=every, y=every, boundary="pad", coord_func="min")
         to_centre = {axis: (every - 1) / 2 * side for axis, side in zip("xy", spacing(field), strict=True)}
-        field = getattr(blocks, LOOK.get(str(field.name), LOOK["displacement"])[1])()
+        reduced = getattr(blocks, LOOK.get(str(field.name), LOOK["displacement"])[1])()
+        if field.name == "pressure" and bool((field < 0).any()):
+            lowest = blocks.min()  # the tension of a block, if it is larger than its pressure
+            reduced = reduced.where(~(reduced < -lowest), lowest)
+        field = reduced
         field = field.assign_coords({axis: field[axis] + shift for axis, shift in to_centre.items()})
     return field.load()
 
@@ -150,36 +156,65 @@ def map_size(field: xr.DataArray | xr.Dataset, width: float, height: float) -> t
     return min(width, height / ratio), min(height, width * ratio)
 
 
-def scale_ends(name: str, frames: Iterable[xr.DataArray]) -> tuple[float, float, float]:
-    """Return the smallest value of a field at some rows, the upper end of its scale, and the largest value. [SI]
+class Ends(NamedTuple):
+    """Smallest value of a field, lower and upper end of its scale, and largest value; and whether the scale has signs.
 
-    Few values far beyond all others are above the scale. Fields that begin at zero count where they are positive.
+    A scale with signs is the scale of a pressure that is negative somewhere. Zero is in its middle.
     """
-    begins_at_zero, ends = LOOK.get(name, LOOK["displacement"])[2] is not None, []
+
+    lowest: float
+    low: float
+    high: float
+    most: float
+    is_signed: bool = False
+
+
+def scale_ends(name: str, frames: Iterable[xr.DataArray]) -> Ends:
+    """Return the ends of the scale of a field at some rows. [SI]
+
+    Few values far beyond all others are outside the scale. Fields that begin at zero count where they are positive.
+    """
+    begins_at_zero = LOOK.get(name, LOOK["displacement"])[2] is not None
+    ends, signed = list[Any](), list[Any]()
     for frame in frames:
+        if name == "pressure" and (frame.values < 0).any():
+            signed.append(np.nanpercentile(frame.values, (0, 100 - _SHOWN, _SHOWN, 100)))
         known = frame.values[frame.values > 0 if begins_at_zero else np.isfinite(frame.values)]
         if known.size:
             ends.append(np.percentile(known, (0, _SHOWN, 100)))
+    if signed:
+        (lowest, low), (_, most) = np.min(signed, axis=0)[:2], np.max(signed, axis=0)[2:]
+        high = max([np.max(signed, axis=0)[2], *(end[1] for end in ends), -1e-3 * low])
+        most = max([most, *(end[2] for end in ends)])
+        return Ends(float(lowest), float(low), float(high), float(most), is_signed=True)
     lowest, high, most = np.transpose(ends or [(0.0, 1.0, 1.0)])
     high = most.max() if most.max() < _SPIKE * high.max() else high.max()
-    return float(lowest.min()), float(high), float(most.max())
+    return Ends(float(lowest.min()), float(lowest.min()), float(high), float(most.max()))
 
 
 def colour_scale(name: str, frames: Iterable[xr.DataArray]) -> tuple[Unit, Normalize]:
-    """Return unit and colour scale of a field at some rows."""
+    """Return unit and colour scale of a field at some rows.
+
+    If a pressure is negative somewhere, zero is in the middle of the scale, and both ends have their full colour.
+    """
     begins_at_zero = LOOK[name][2] is not None
-    lowest, high, most = scale_ends(name, frames)
-    unit = unit_for([lowest, high], VARIABLES[name].units)
-    low, high = float(unit(lowest)), float(unit(high))
+    ends = scale_ends(name, frames)
+    unit = unit_for([ends.low, ends.high], VARIABLES[name].units)
+    low, high = float(unit(ends.low)), float(unit(ends.high))
+    if ends.is_signed:
+        return unit, TwoSlopeNorm(0.0, low, high)
     if name == "flux":
-        high = high if most > _NO_FLOW else 1.0  # nothing flows: all is below the scale
+        high = high if ends.most > _NO_FLOW else 1.0  # nothing flows: all is below the scale
         return unit, LogNorm(1e-3 * high, high)
     return unit, Normalize(1e-12 * high if begins_at_zero else low, high)
 
 
 def contact_of(dataset: xr.Dataset, frame: int) -> xr.DataArray | None:
-    """Return the drawn cells in contact, 1 or 0, at one row; None if the result has neither pressure nor gap."""
-    for name in ("pressure", "gap"):
+    """Return the drawn cells in contact, 1 or 0, at one row; None if the result has neither pressure nor gap.
+
+    With adhesion contact may carry tension, so that only the gap shows it.
+    """
+    for name in ("pressure", "gap") if "adhesive_force" not in dataset else ("gap",):
         if name in dataset:
             field = frame_of(dataset, name, frame)
             is_touching = field > 0 if name == "pressure" else field <= 0
@@ -212,6 +247,8 @@ def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, norm: Normalize) -> Axes
         Colour scale, in this unit.
     """
     plane, (colours, _, below, _) = plane_unit(field), LOOK[str(field.name)]
+    if isinstance(norm, TwoSlopeNorm):
+        colours, below = SIGNED, None
     x, y = map(plane, cell_edges(field))
     bad = style.CONTACT if field.name == "flux" else style.MISSING
     values, extent = np.ma.masked_invalid(unit(field.transpose("y", "x"))), (x[0], x[-1], y[0], y[-1])
@@ -235,13 +272,16 @@ def _draw_field(
             image = draw_map(axes[i], field, unit, norm)
             draw_outline(axes[i], contact_of(dataset, frames[i]))
         values = unit(np.concatenate(fields))
-        if below and (values < norm.vmin).any():
+        is_signed = isinstance(norm, TwoSlopeNorm)
+        if below and not is_signed and (values < norm.vmin).any():
             named[word] = Patch(facecolor=below, edgecolor="0.5", lw=0.4)
         if np.isnan(values).any():
             label, colour = ("contact", style.CONTACT) if name == "flux" else ("missing", style.MISSING)
             named[label] = Patch(color=colour)
         known = values[np.isfinite(values)]
         extend = "max" if known.size and known.max() > norm.vmax else "neither"
+        if is_signed and known.min() < norm.vmin:
+            extend = "both" if extend == "max" else "min"
         if not (name == "flux" and known.size and known.max() < norm.vmin):  # nothing flows
             style.colour_bar(image, [axes[i] for i in group], unit.label(VARIABLES[name].label), extend=extend)
     return named
@@ -262,7 +302,8 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
     """Draw maps of fields at some times or speeds, with one colour scale for each field.
 
     All fields darken as they rise, and a thin dark line encloses the contact. Cells without contact are light blue on a
-    map of the pressure. Cells in contact are orange on maps of the gap and of the flux. Maps over speed and of the flux
+    map of the pressure. If there is tension, zero is white, tension blue and pressure red, each with its own scale.
+    Cells in contact are orange on maps of the gap and of the flux. Maps over speed and of the flux
     have a scale each, because they span decades. Above 1024 cells a side, one drawn cell
     shows the largest pressure and flux, and the smallest gap, of a block of cells. The colour scale may leave out two
     of a thousand values, marked by an arrow at the colour bar. The flux has a logarithmic scale of three decades.
@@ -376,7 +417,7 @@ def section(dataset: xr.Dataset, time: Any = None, axis: str = "x", at: Quantity
     figure, (top, bottom) = style.new_panels(2, 1, (4.1, 1.4), shared="x")
     style.letter([top, bottom])
     top.stairs(pressure(cut["pressure"]), edges, fill=True, fc=(0, 0.62, 0.45, 0.3), ec=style.GREEN, lw=1)
-    top.set(ylim=(0, None), ylabel=pressure.label("Pressure"))
+    top.set(ylim=(0 if float(cut["pressure"].min()) >= 0 else None, None), ylabel=pressure.label("Pressure"))
     bottom.plot(x, unit(height), color="0.25", lw=1)
     bottom.plot(x, unit(surface), color=style.BLUE, lw=1)
     look = {"color": style.CONTACT, "lw": 2.4, "ms": 2.4, "mew": 0, "label": "contact"}

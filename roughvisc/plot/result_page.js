@@ -33,8 +33,10 @@
     if (field.decades) return code ? field.most * 10 ** (field.decades * (code / levels - 1)) : 0;
     return field.least + (code / levels) * (field.most - field.least);
   }
+  // With tension, cells in contact may have a pressure below zero: then only the gap shows the contact.
+  const contactField = ({ fields: { pressure, gap } }) => (pressure?.isSigned ? gap : pressure ?? gap);
   function contactOf(one, row) { // which cells are in contact: with pressure, else without a gap
-    const field = one.fields.pressure ?? one.fields.gap;
+    const field = contactField(one);
     if (!field) return null;
     const isPressure = field === one.fields.pressure;
     return frame(field, row).map((code) => +(code <= levels && (isPressure ? code > 0 : code === 0)));
@@ -109,7 +111,7 @@
     for (const id of ["key", "map", "reading", "profile"]) element(id).hidden = !names.length;
     if (names.length) {
       const field = await unpack(one.fields[chosen.field]);
-      await unpack(one.fields.pressure ?? one.fields.gap ?? field);
+      await unpack(contactField(one) ?? field);
       fit(one, drawnCase >= 0 && same(cases[drawnCase], one));
       drawMap(one, field);
       drawCut();
@@ -134,13 +136,15 @@
   function endsOf(one, field) { // of the colours, as values
     if (chosen.scale === "all") {
       const all = cases.map((other) => other.fields[chosen.field]).filter((other) => other);
-      return [Math.min(...all.map((other) => other.low)), Math.max(...all.map((other) => other.high))];
+      const low = field.under && !field.decades ? 0 : Math.min(...all.map((other) => other.low));
+      return [low, Math.max(...all.map((other) => other.high))];
     }
     if (chosen.scale === "case") return [field.low, field.high];
     const known = Array.from(frame(field, chosen.row)).filter((code) => code <= levels && (!field.under || code > 0));
     if (!known.length) return [field.low, field.high];
     const high = valueOf(field, known.reduce((a, b) => Math.max(a, b)));
     const low = field.decades ? high * 1e-3 : field.under ? 0 : valueOf(field, known.reduce((a, b) => Math.min(a, b)));
+    if (field.isSigned) return [Math.min(low, -1e-3 * high), Math.max(high, -1e-3 * low)];
     return [low, high];
   }
 
@@ -150,7 +154,7 @@
     const shades = new Float32Array(levels + 2); // level -> place on the colours, below them -1
     for (let code = 0; code <= levels; code++) {
       const value = valueOf(field, code);
-      const place = field.decades ? Math.log(value / low) / Math.log(high / low) : high > low ? (value - low) / (high - low) : 0.5;
+      const place = field.isSigned ? 0.5 + (0.5 * value) / (value < 0 ? -low : high) : field.decades ? Math.log(value / low) / Math.log(high / low) : high > low ? (value - low) / (high - low) : 0.5;
       shades[code] = (field.under && code === 0) || place < 0 ? (field.under ? -1 : 0) : Math.min(place, 1);
     }
     shades[levels + 1] = NaN;

@@ -29,7 +29,7 @@ from roughvisc.labels import steps_of
 from roughvisc.observables.history import expect_result
 from roughvisc.paths import path_of
 from roughvisc.plot import style
-from roughvisc.plot.fields import LOOK, MOST_CELLS, flux_of, frame_of, largest_row, plane_unit, scale_ends
+from roughvisc.plot.fields import LOOK, MOST_CELLS, SIGNED, flux_of, frame_of, largest_row, plane_unit, scale_ends
 from roughvisc.progress import reporting
 from roughvisc.runs.folder import results_at, write_text
 from roughvisc.runs.netcdf import open_result
@@ -336,8 +336,10 @@ def _packed(dataset: xr.Dataset, name: str, rows: Sequence[int], cells: int) -> 
     """Return a field as levels of its frames, as differences from frame to frame, compressed, with its look."""
     palette, _, below, word = LOOK.get(name, LOOK["displacement"])
     label, si = style.described(dataset[name])
-    lowest, high, most = scale_ends(name, _frames(dataset, name, rows, cells))
-    unit = unit_for([lowest, high], si)
+    lowest, low, high, most, is_signed = scale_ends(name, _frames(dataset, name, rows, cells))
+    unit = unit_for([low, high], si)
+    if is_signed:
+        palette, below, most = SIGNED, None, max(most, 0.0)
     decades = _DECADES if name == "flux" else 0
     least = 0.0 if below else lowest
     spread = most - least or 1.0
@@ -365,10 +367,11 @@ def _packed(dataset: xr.Dataset, name: str, rows: Sequence[int], cells: int) -> 
         "under": {"word": word, "colour": below} if below else None,
         "absent": absent,
         "decades": decades,
+        "isSigned": is_signed,
         "size": size,
         "least": float(unit(least)),
         "most": float(unit(most)),
-        "low": float(unit(1e-3 * high if decades else 0.0 if below else lowest)),
+        "low": float(unit(1e-3 * high if decades else 0.0 if below else low)),
         "high": float(unit(high)),
         "data": base64.b64encode(data).decode(),
     }

@@ -26,6 +26,7 @@ from roughvisc.errors import InputError, RoughviscError, short_repr
 from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.sliding import SteadySliding
+from roughvisc.mechanics.adhesion import Adhesion
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.materials.material import Creep, Material, Prony, ThermalLaw
 from roughvisc.mechanics.materials.models import creep_series
@@ -43,7 +44,14 @@ from roughvisc.study.identity import (
     surface_identity,
 )
 from roughvisc.study.material_file import with_line
-from roughvisc.study.objects import experiment_of, experiment_table, material_table, surface_table, tables_of
+from roughvisc.study.objects import (
+    adhesion_table,
+    experiment_of,
+    experiment_table,
+    material_table,
+    surface_table,
+    tables_of,
+)
 from roughvisc.study.study_file import (
     TABLE_OF,
     TABLES,
@@ -69,7 +77,7 @@ __all__ = ["Case", "read_cases", "read_study", "vary"]
 _LISTS = ("program", "fields", "times", "speeds", "shape", "size", "spacing", "resample", "x", "y", "offset")
 _LISTS += ("moduli", "ratios", "compliances", "frequencies", "storage", "loss", "shift_factors", "values")
 #: Arguments of a case that objects of Python state.
-_OBJECTS = ("surface", "material", "program")
+_OBJECTS = ("surface", "material", "program", "adhesion")
 
 
 @dataclass(frozen=True, init=False, repr=False)
@@ -90,7 +98,7 @@ class Case:
         Load, nominal pressure or approach against time, or steady sliding, with its speeds in increasing order.
     title : str
         Title of the results. It names the default folder, ``results/`` and the title.
-    boundary, tolerance, times, fields, missing, edge, grid_error, numerics
+    boundary, tolerance, times, fields, missing, edge, grid_error, adhesion, numerics
         As in :func:`roughvisc.simulate`.
     observe, audit : mapping, optional
         The tables of a study file: quantities to add to the result, such as ``{"leakage": {"viscosity": "2 mPa s"}}``,
@@ -166,6 +174,7 @@ class Case:
         missing: Missing = Settings.missing,
         edge: Edge = Settings.edge,
         grid_error: bool | Literal["auto"] = Settings.grid_error,
+        adhesion: Adhesion | None = None,
         numerics: Numerics = Numerics(),
         observe: Mapping[str, Any] | None = None,
         audit: Mapping[str, Any] | None = None,
@@ -180,6 +189,7 @@ class Case:
             missing=missing,
             edge=edge,
             grid_error=grid_error,
+            adhesion=adhesion,
             **vars(numerics),
         )
         further = {"title": title, "observe": observe, "audit": audit}
@@ -617,6 +627,8 @@ def changed(
             placed["surface"], heights = surface_table(value)
         elif key == "program" and _is_object(key, value):
             placed |= {"program": None, "friction": None} | experiment_table(experiment_of(value))
+        elif key == "adhesion" and _is_object(key, value):
+            placed["adhesion"] = adhesion_table(value)
         elif key == "material" and _is_object(key, value):
             function = Body(value) if isinstance(value, Prony | Creep) else value
         else:

@@ -26,7 +26,7 @@ from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.layer import LayeredBody
 from roughvisc.mechanics.materials import MODELS
 from roughvisc.mechanics.materials.material import Creep, Prony
-from roughvisc.settings import Settings
+from roughvisc.settings import Settings, attraction
 from roughvisc.study.study_file import in_si
 from roughvisc.topography.conditioning import FACE_STEPS, STEPS
 from roughvisc.topography.heights import digest_in
@@ -205,6 +205,7 @@ def settings_identity(settings: Settings) -> dict[str, Any]:
     """Return the settings without defaults, and the fields in alphabetic order, each once."""
     found: dict[str, Any] = {"fields": sorted(set(settings.fields))}
     for one in fields(settings):
-        if one.name != "fields" and (value := getattr(settings, one.name)) != one.default:
-            found[one.name] = value
+        value = attraction(settings) if one.name == "adhesion" else getattr(settings, one.name)
+        if one.name != "fields" and value != one.default:
+            found[one.name] = _plain(value)
     return found

@@ -107,8 +107,8 @@ def read_history(
                 advice = "Does the machine count compression negative? Then factor = -1."
             elif below[0] > values.argmax():
                 advice = (
-                    "A pull-off is adhesion, which is not modelled: delete the rows after the end of the hold, at the "
-                    f"latest from line {lines[below[0]]} on ({times[below[0]]:g} s)."
+                    "A pull-off is adhesion: prescribe the approach of the record, with adhesion, or delete the rows "
+                    f"after the end of the hold, at the latest from line {lines[below[0]]} on ({times[below[0]]:g} s)."
                 )
             else:
                 advice = "`zero` takes an offset off."

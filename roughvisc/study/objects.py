@@ -19,6 +19,7 @@ from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.problem import OPEN_BOUNDARY, boundary_of
 from roughvisc.experiment.sliding import SteadySliding
+from roughvisc.mechanics.adhesion import Adhesion
 from roughvisc.mechanics.body import HALF_SPACE, Body
 from roughvisc.mechanics.layer import LayeredBody
 from roughvisc.mechanics.materials.material import Creep, Material, Prony, check_material, pair_creep, power_creep
@@ -59,8 +60,10 @@ def tables_of(
     tables |= experiment_table(experiment)
     for one in fields(Settings):
         value = getattr(settings, one.name)
-        if value != one.default:
+        if one.name in TABLE_OF and value != one.default:
             tables.setdefault(TABLE_OF[one.name], {})[one.name] = list(value) if isinstance(value, tuple) else value
+    if settings.adhesion is not None:
+        tables["adhesion"] = adhesion_table(settings.adhesion)
     if heights is not None and settings.boundary == "auto" and settings.edge != "accept":
         found = experiment.boundary or boundary_of(heights)
         if found is None:
@@ -167,6 +170,22 @@ def _series_of(material: Creep, experiment: Experiment, settings: Settings) -> P
     return series_of_run(material, experiment.program, settings)
 
 
+# ------------------------------------------------------------------------------------------------------------- adhesion
+
+
+def adhesion_table(adhesion: Any) -> dict[str, float]:
+    """Return the table of an attraction.
+
+    Raises
+    ------
+    InputError
+        If the argument is not an attraction.
+    """
+    if not isinstance(adhesion, Adhesion):
+        raise InputError(key="adhesion", found=adhesion, expected="rv.adhesion(work=..., range=...), or None")
+    return {"work": adhesion.work, "range": adhesion.range}
+
+
 # ----------------------------------------------------------------------------------------------------------- experiment
 
 
@@ -194,7 +213,7 @@ def experiment_table(experiment: Experiment) -> dict[str, Any]:
             tables.append({"hold": one.duration, "control": one.control})
         else:
             tables.append({one.control: one.end, "over": one.duration})
-    if program_of(tables) != experiment.program:
+    if program_of(tables, can_pull=True) != experiment.program:
         expected = "segments that the methods of rv.Program make"
         raise InputError(key="program", found=experiment.program, expected=expected)
     return {"program": tables}

@@ -23,6 +23,7 @@ from roughvisc.arguments import (
     arguments,
     call,
     check,
+    dotted,
     located,
     one_key,
     one_of,
@@ -36,6 +37,7 @@ from roughvisc.experiment.base import Experiment
 from roughvisc.experiment.loading import Loading
 from roughvisc.experiment.problem import OPEN_BOUNDARY
 from roughvisc.experiment.sliding import SteadySliding
+from roughvisc.mechanics.adhesion import adhesion
 from roughvisc.mechanics.body import Body
 from roughvisc.mechanics.layer import layer
 from roughvisc.mechanics.materials import MODELS
@@ -58,7 +60,7 @@ from roughvisc.units import number
 log = logging.getLogger("roughvisc")
 
 #: Tables of a study, without its sweep.
-TABLES = ("title", "surface", "material", "program", "friction", "solve", "keep", "observe", "audit")
+TABLES = ("title", "surface", "material", "adhesion", "program", "friction", "solve", "keep", "observe", "audit")
 #: Keys of a temperature, which every model has, and of a body that is not a half-space.
 TEMPERATURE = ("temperature", "reference_temperature", "wlf_c1", "wlf_c2", "activation_energy", "shift_factor")
 GEOMETRY = ("thickness", "base", "on")
@@ -67,8 +69,8 @@ SEGMENTS: dict[str, Callable[..., Program]] = {
     name: getattr(Program, name) for name in ("load", "pressure", "approach", "hold", "slide")
 }
 PROGRAMS: dict[str, Callable[..., Program]] = {name: getattr(Program, name).__func__ for name in ("cycle", "table")}
-#: Table of each setting.
-TABLE_OF = {one.name: "solve" for one in fields(Settings)} | {"missing": "surface"}
+#: Table of each setting; adhesion is a table itself.
+TABLE_OF = {one.name: "solve" for one in fields(Settings) if one.name != "adhesion"} | {"missing": "surface"}
 TABLE_OF |= dict.fromkeys(("fields", "times"), "keep")
 _KEYS_OF = {table: [name for name, one in TABLE_OF.items() if one == table] for table in ("solve", "keep")}
 #: Observable -> fields, one of which it needs.
@@ -95,7 +97,7 @@ _TAKING: tuple[Callable[..., Any], ...] = (
     *MODELS.values(),
     wlf,
 )
-_TAKING += (arrhenius, sheet, SteadySliding, Settings, *OBSERVABLES.values(), properties)
+_TAKING += (arrhenius, sheet, adhesion, SteadySliding, Settings, *OBSERVABLES.values(), properties)
 #: Unit of each key, from the functions that take the arguments; ``"1"`` for a pure number.
 _UNITS = {name: unit for function in _TAKING for name, unit in units_of(function).items()}
 _UNITS |= {name: units_of(step.function).get(step.argument, "") for name, step in STEPS.items()}
@@ -226,7 +228,7 @@ def without_late_times(tables: Mapping[str, Any]) -> tuple[dict[str, Any], tuple
     times = value_at(tables, "keep.times", None)
     late: list[float] = []
     if isinstance(times, list) and "program" in tables:
-        end = program_of(tables["program"]).duration * (1 + _ROUNDING)
+        end = program_of(tables["program"], "adhesion" in tables).duration * (1 + _ROUNDING)
         late = [time for time in times if isinstance(time, int | float) and time > end]
     if not 0 < len(late) < len(times or ()):
         return dict(tables), ()
@@ -303,10 +305,10 @@ def parts_of(tables: Mapping[str, Any]) -> dict[str, Any]:
         found = [name for name in ("program", "friction") if name in tables]
         raise InputError(key="program", found=found, expected=expected)
     if "program" in tables:
-        experiment: Experiment = Loading(program_of(tables["program"]))
+        experiment: Experiment = Loading(program_of(tables["program"], "adhesion" in tables))
     else:
         experiment = call(SteadySliding, "friction", a_table("friction", tables["friction"]))
-    settings = settings_of(tables, experiment)
+    settings = settings_of(tables, experiment, body)
     observe = a_table("observe", tables.get("observe", {}))
     refuse_unknown("observe", observe, OBSERVABLES)
     for name, stated in observe.items():
@@ -376,8 +378,8 @@ def shift_factor(table: Mapping[str, Any], where: str = "material") -> float:
     return factor
 
 
-def program_of(segments: Any) -> Program:
-    """Return the program of the tables ``[[program]]``."""
+def program_of(segments: Any, can_pull: bool = False) -> Program:
+    """Return the program of the tables ``[[program]]``; `can_pull` is whether loads may be negative."""
     if not isinstance(segments, list) or not segments:
         raise InputError(key="program", found=segments, expected="a list of [[program]] tables, at least one")
     program = Program()
@@ -388,6 +390,7 @@ def program_of(segments: Any) -> Program:
         value = table.pop(kind)
         if kind in SEGMENTS:
             program = call(SEGMENTS[kind], where, table, program, value)
+            check_loads(f"{where}.{kind}", value, program, can_pull)
             continue
         refuse_unknown(where, table, ("control",))
         control = one_of(f"{where}.control", table.get("control", "load"), UNITS)
@@ -396,10 +399,22 @@ def program_of(segments: Any) -> Program:
         if "control" in arguments:
             raise InputError(key=f"{where}.control", found=arguments["control"], expected=f"this key next to {kind}")
         program = call(PROGRAMS[kind], where, arguments | {"control": control}, program)
+        key = "amplitude" if kind == "cycle" else "values"
+        check_loads(f"{where}.{key}", arguments.get(key), program, can_pull)
     return program
 
 
-def settings_of(tables: Mapping[str, Any], experiment: Experiment) -> Settings:
+def check_loads(where: str, stated: Any, program: Program, can_pull: bool) -> None:
+    """Refuse a program whose last table, with a stated value, has a negative load or pressure without adhesion."""
+    if program.lowest_load >= 0 or can_pull:
+        return
+    if isinstance(stated, list):
+        row = next(row for row, value in enumerate(stated) if value < 0)
+        where, stated = f"{where}.{row}", stated[row]
+    raise InputError(key=where, found=stated, expected="a load or pressure of at least 0, or a table [adhesion]")
+
+
+def settings_of(tables: Mapping[str, Any], experiment: Experiment, body: Body) -> Settings:
     """Return the settings of a case, with the boundary that ``auto`` resolves to."""
     stated = split(tables["surface"], "missing")[0]
     for table in _KEYS_OF:
@@ -408,6 +423,8 @@ def settings_of(tables: Mapping[str, Any], experiment: Experiment) -> Settings:
         stated |= here
     if stated.get("times") == "all":
         del stated["times"]
+    if "adhesion" in tables:
+        stated["adhesion"] = call(adhesion, "adhesion", a_table("adhesion", tables["adhesion"]))
     try:
         settings = call(Settings, "", stated)
     except InputError as error:
@@ -423,6 +440,6 @@ def settings_of(tables: Mapping[str, Any], experiment: Experiment) -> Settings:
         end, last = experiment.program.duration, max(settings.times, default=0.0)
         if last > end * (1 + _ROUNDING):
             raise InputError(key="keep.times", found=last, expected=f"times up to the end of the program, {end:g} s")
-    for name, value, expected in experiment.unsupported(settings):
-        raise InputError(key=f"{TABLE_OF[name]}.{name}", found=value, expected=expected)
+    for name, value, expected in experiment.unsupported(settings, body):
+        raise InputError(key=dotted(TABLE_OF.get(name, ""), name), found=value, expected=expected)
     return settings

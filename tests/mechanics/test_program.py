@@ -72,9 +72,6 @@ def test_cycle__is_a_sine_about_its_mean():
 @pytest.mark.parametrize(
     ("make", "key", "found"),
     [
-        (lambda: rv.Program.table([0, 1], [0, -1.0]), "values.1", -1.0),
-        (lambda: rv.Program.table([0], [-1.0], "pressure"), "values.0", -1.0),
-        (lambda: rv.Program.cycle(1.0, 2.0, 1.0, 3), "amplitude", 2.0),
         (lambda: rv.Program.cycle(1.0, 0.5, 1e305, 1e6), "cycles", math.inf),
         (lambda: PRESSED.load(1.0, over=-1), "over", -1),
         (lambda: PRESSED.load(math.nan, over=1), "load", math.nan),

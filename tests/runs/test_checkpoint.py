@@ -84,6 +84,15 @@ PULLED = (
     .replace('load = "5 mN"\nover = "1 ms"', 'approach = "2 um"\nover = "50 ms"')
     .replace('hold = "0.2 s"\ncontrol = "approach"', 'approach = "9 um"\nover = "50 ms"')
 )
+# Sticks, and is pulled off; the same on an elastic body, whose contact jumps.
+STICKY = (
+    MODES.replace("[40, 33]", "[16, 13]")
+    .replace("[[program]]", '[adhesion]\nwork = "0.1 J/m^2"\nrange = "2 um"\n[[program]]', 1)
+    .replace('load = "20 mN"', 'approach = "1 um"')
+    .replace('load = "5 mN"\nover = 0', 'approach = "-12 um"\nover = "0.1 s"')
+)
+JUMPING = STICKY.replace('model = "zener"', 'model = "elastic"').replace('kelvin_modulus = "1 MPa"\n', "")
+JUMPING = JUMPING.replace('kelvin_viscosity = "0.1 MPa s"\n', "").replace('"3 MPa"', '"0.6 MPa"')
 # Two materials that creep in different times: a memory of the waves.
 LAYER = (
     MODES.replace("[40, 33]", "[20, 15]")
@@ -109,6 +118,8 @@ CASES = {
     "sliding": SLIDING,
     "pulled": PULLED,
     "layer": LAYER,
+    "sticky": STICKY,
+    "jumping": JUMPING,
     "curve": CURVE,
 }
 
