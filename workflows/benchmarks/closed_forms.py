@@ -19,10 +19,10 @@ A row is one number of a result with its true and its stated error. Kinds:
 
 The seed is the date unless given, so that each day draws other scenes. Prints by kind the number of rows; those without
 a stated error; those beyond the tolerance; those that are bad: beyond 1.5 tolerances and 1.5 times the stated error
-(work: half a tolerance); the median of stated over true error, errors below a thousandth and below a hundredth of the
-tolerance counting as that; and the convolutions. The tolerance of ``grid`` is the
-noise of its references. The error of a friction force of ``slides-friction`` is relative to the largest one of the
-program. 100 scenes of a kind take half a minute on one core, those of ``channels`` a second.
+(work: half a tolerance); the median of stated over true error, where errors below a thousandth and below a hundredth of
+the tolerance count as that; and the convolutions. The tolerance of ``grid`` is the noise of its references. The error
+of a friction force of ``slides-friction`` is relative to the largest one of the program. 100 scenes of a kind take half
+a minute on one core, those of ``channels`` a second.
 """
 
 import argparse
