@@ -245,7 +245,7 @@ def rows(name):
         if default == "required" and key in needed:
             default = "required, or `file`"
         found.append((key, unit, default, meaning(function, argument)))
-    return found
+    return [(*row, text[:1].upper() + text[1:]) for *row, text in found]
 
 
 def table(name):

@@ -1,7 +1,9 @@
 """The documentation: its Python runs, its studies are accepted, its commands and names exist."""
 
+import importlib
 import inspect
 import json
+import operator
 import os
 import re
 import shutil
@@ -138,6 +140,14 @@ def test_reference__names_everything_public():
     assert public <= set(listed)
     functions = set(re.findall(r"^   (\w+\.\w+)$", (DOCS / "reference.md").read_text(), re.M))
     assert functions == {f"{name}.{one}" for name in ("plot", "observables") for one in getattr(rv, name).__all__}
+
+
+def test_reference__names_nothing_that_is_not_there():
+    page = (DOCS / "reference.md").read_text(encoding="utf-8")
+    for part in page.split(".. currentmodule:: ")[1:]:
+        module = importlib.import_module(part.partition("\n")[0])
+        for name in re.findall(r"^   ([\w.]+)$", part, re.M):
+            assert operator.attrgetter(name)(module) is not None, name
 
 
 def test_gallery__is_what_its_script_writes(docs_script):
