@@ -1,5 +1,6 @@
 """The documentation: its Python runs, its studies are accepted, its commands and names exist."""
 
+import ast
 import importlib
 import inspect
 import json
@@ -153,6 +154,33 @@ def test_reference__names_nothing_that_is_not_there():
 def test_gallery__is_what_its_script_writes(docs_script):
     page = docs_script("make_gallery").page()
     assert page == (DOCS / "gallery.md").read_text(encoding="utf-8"), "run docs/make_gallery.py"
+
+
+@pytest.mark.thorough
+def test_pictures__are_not_older_than_the_code_that_draws_them(docs_script):
+    gallery = docs_script("make_gallery")
+    older = docs_script("picture_age").older(gallery.digests())
+    names = {gallery.drawing_code()[path][0] for path in older}
+    assert not older, f"python docs/make_gallery.py {' '.join(sorted(names))}; with --as-they-are if no picture changes"
+
+
+def test_picture__is_older_after_an_edit_that_may_change_it(docs_script):
+    age, study = docs_script("picture_age"), ROOT / "workflows" / "quickstart.toml"
+    before = age.digest_of(ast.parse("def draw(ds):\n    'As it was.'\n    rv.plot.maps(ds, dpi=100)"), study)
+    same = ast.parse("# a comment\ndef draw(ds):\n    rv.plot.maps(\n        ds, dpi=100\n    )")
+    assert age.digest_of(same, study) == before
+    for code in (
+        "def draw(ds):\n    return rv.plot.maps(ds, dpi=120)",
+        "def draw(ds):\n    return rv.plot.section(ds, dpi=100)",
+    ):
+        assert age.digest_of(ast.parse(code), study) != before
+    assert age.digest_of(same, ROOT / "workflows" / "friction.toml") != before
+
+
+def test_pictures__have_a_text_for_readers_who_do_not_see_them():
+    for path in [README, *PAGES]:
+        for text in re.findall(r"!\[(.*?)\]\(", path.read_text(encoding="utf-8")):
+            assert len(text.split()) > 3, f"{named(path)}: {text}"
 
 
 def test_tables__are_in_the_pages_as_the_package_has_them(docs_script):
