@@ -26,6 +26,7 @@ from PIL import Image
 
 import roughvisc as rv
 from roughvisc.study.case import Case
+from roughvisc.study.case_text import study_text
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
@@ -228,7 +229,9 @@ def draw_realisations(path):
     study["sweep"] = {"realisations": 24}
     study["keep"]["fields"] = []
     with tempfile.TemporaryDirectory() as folder:
-        results = rv.sweep(study, folder, workers=0, progress=False)
+        file = Path(folder) / "study.toml"
+        file.write_text(study_text(study), encoding="utf-8")
+        results = rv.sweep(file, folder, workers=0, progress=False)
         save_changed(rv.plot.sweep(results, along="time"), path, dpi=130)
         results.close()
 
@@ -243,10 +246,10 @@ def draw_trade(path):
 
 def draw_master(path):
     """Master curve of a made polymer, as in machine.md."""
-    names = {"frequency": "f", "storage": "E_stor", "loss": "E_loss", "temperature": "T"}
+    names = {"frequency": "Frequency", "storage": "E'", "loss": "E''", "temperature": "T [degC]"}
     polymer = rv.read_material(
         ROOT / "tests/study/study_file/exports/temperatures.csv", "dynamic_table", columns=names,
-        kind="tensile", vertical="none", temperature="25 degC",
+        kind="tensile", vertical="none", temperature="24.98 degC",  # one of those measured
     )  # fmt: skip
     save_changed(rv.plot.master_curve(polymer), path, dpi=140)
 
