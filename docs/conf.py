@@ -1,10 +1,7 @@
 """Sphinx: ``sphinx-build -W -b html docs docs/_build``."""
 
 import importlib.metadata
-import sys
 from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parent))  # page_tables.py, study_keys.py
 
 project = "roughvisc"
 author = "The roughvisc developers"
@@ -55,18 +52,3 @@ html_sidebars = {
     },
 }
 copyright = author
-
-
-def _with_tables(app, docname, source):
-    """Insert the tables that come from the package."""
-    import page_tables
-    import study_keys
-
-    source[0] = page_tables.filled(source[0])
-    if docname == "study-files":
-        source[0] = study_keys.filled(source[0])
-
-
-def setup(app):
-    """Hook of Sphinx."""
-    app.connect("source-read", _with_tables)

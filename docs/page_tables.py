@@ -1,10 +1,14 @@
-"""Tables of pages that come from the package, when the pages are built.
+"""Tables of pages that come from the package.
 
-``python docs/page_tables.py variables`` prints a table. In a page a table is a line with this command.
+``python docs/page_tables.py`` rewrites them in place, in all pages, and prints the pages that have changed. A line
+``<!-- table "variables" -->`` in a page stands above each table; a new table needs this line only.
 """
 
 import re
-import sys
+from functools import partial
+from pathlib import Path
+
+import study_keys
 
 from roughvisc.judge.audit import LIMITS
 from roughvisc.topography.formats import STATED, TAKEN, TOP_FIRST
@@ -47,15 +51,36 @@ def orientations():
     return "\n".join([*lines, f"| all others | y = 0 | {TAKEN} |"])
 
 
-#: Line of a page in place of a table, and the functions that return the tables.
-MARK = re.compile(r"^`python docs/page_tables\.py (\w+)` prints this table\.$", re.M)
-TABLES = {"variables": variables, "limits": limits, "orientations": orientations}
+#: Name of a table -> function that returns it.
+TABLES = {
+    "variables": variables,
+    "limits": limits,
+    "orientations": orientations,
+    **{name: partial(study_keys.table, name) for name in study_keys.TABLES},
+}
+#: The line above a table, and the table.
+MARK = re.compile(r'^<!-- table "(.+)" -->\n(\n\|.*(?:\n\|.*)*\n)?', re.M)
 
 
 def filled(page):
-    """Return the text of a page with its tables."""
-    return MARK.sub(lambda found: TABLES[found[1]](), page)
+    """Return the text of a page with its tables as the package has them now."""
+    return MARK.sub(lambda mark: f'<!-- table "{mark[1]}" -->\n\n{TABLES[mark[1]]()}\n', page)
+
+
+def pages():
+    """Return the path of each page in Markdown."""
+    root = Path(__file__).parent
+    return [
+        path
+        for path in sorted(root.rglob("*.md"))
+        if not {"_build", "generated"} & set(path.relative_to(root).parts)
+    ]
 
 
 if __name__ == "__main__":
-    print(TABLES[sys.argv[1]]())
+    for path in pages():
+        before = path.read_text(encoding="utf-8")
+        after = filled(before)
+        if after != before:
+            path.write_text(after, encoding="utf-8")
+            print(path)

@@ -1,13 +1,10 @@
 """Tables of the keys of study files, from signatures and docstrings.
 
-``python docs/study_keys.py`` prints the page ``study-files.md`` with its tables, and with the name of a table this one.
-In the page a table is a line with the command that prints it.
+``python docs/page_tables.py`` writes them into the page ``study-files.md``.
 """
 
 import inspect
 import re
-import sys
-from pathlib import Path
 
 import roughvisc as rv
 from roughvisc.arguments import arguments, units_of
@@ -251,7 +248,7 @@ def rows(name):
         if default == "required" and key in needed:
             default = "required, or `file`"
         found.append((key, unit, default, meaning(function, argument)))
-    return found
+    return [(*row, text[:1].upper() + text[1:]) for *row, text in found]
 
 
 def table(name):
@@ -264,17 +261,3 @@ def table(name):
             *("| " + " | ".join(one.replace("|", "\\|") for one in row) + " |" for row in cells),
         ]
     )
-
-
-#: Line of the page in place of a table.
-MARK = re.compile(r'^`python docs/study_keys.py "(.+)"` prints these keys\.$', re.M)
-
-
-def filled(page):
-    """Return a page with its tables."""
-    return MARK.sub(lambda found: table(found[1]), page)
-
-
-if __name__ == "__main__":
-    page = Path(__file__).with_name("study-files.md")
-    print(table(sys.argv[1]) if sys.argv[1:] else filled(page.read_text(encoding="utf-8")))

@@ -25,12 +25,10 @@ def test_model__has_a_sample_and_its_own_section():
     assert {name for name in MODELS if f"### `{name}`" not in page} == set()
 
 
-def test_format__is_damaged_by_a_test_and_its_orientation_in_the_page_of_scans(docs_script):
-    page = (DOCS / "howto" / "scan.md").read_text(encoding="utf-8")
+def test_format__is_damaged_by_a_test():
     written = {kind.split()[0] for kind in WRITERS}
     for name, (suffixes, _) in READERS.items():
         assert not suffixes or name in FROM_FILES or written & set(suffixes), f"{name}: WRITERS of test_misreadings.py"
-    assert docs_script("page_tables").orientations() in page, "python docs/page_tables.py orientations"
 
 
 def test_figure__is_in_the_gallery_or_on_a_page_and_has_what_the_command_needs(docs_script):
