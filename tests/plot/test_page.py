@@ -59,6 +59,10 @@ def test_page__shows_in_a_browser_what_the_results_contain(tmp_path):
     one["pressure"][0] = np.nan  # a row without values
     other = one.copy(deep=True)
     other["pressure"] *= 2
+    tension = 0.2 * float(other["pressure"][3].max())
+    edge = np.argwhere((other["pressure"][3] > 0).values)[0]
+    other["pressure"] = other["pressure"].where(other["pressure"] != 0, -tension)
+    other["pressure"][3, edge[0], edge[1]] = -tension / 2  # contact carries tension too
     texts = [{"title": HOSTILE, "varied": {"material.shear_modulus": value}} for value in (1e6, 2e6)]
     for number, (case, text) in enumerate(zip((one, other), texts, strict=True)):
         write_result(case.assign_attrs(case=json.dumps(text), case_key=f"{number:016x}"), tmp_path / f"{number}.nc")
@@ -69,10 +73,11 @@ def test_page__shows_in_a_browser_what_the_results_contain(tmp_path):
     apart = np.argwhere((one.pressure[4] == 0).values & one.height.notnull().values)[7]
     places = [[(a + 0.4) / 24, (b + 0.4) / 20] for a, b in ([i, j], absent, apart)]
     steps = [("row", 4), ("point", crest), ("field", "gap"), ("field", "pressure"), ("key", "ArrowLeft")]
-    steps += [("varied Shear modulus", "2 MPa"), ("scale", "row"), ("row", 0)]
+    stuck = float(one.x[edge[0]] * 1e3), float(one.y[edge[1]] * 1e3)
+    steps += [("varied Shear modulus", "2 MPa"), ("point", stuck), ("scale", "row"), ("row", 0)]
     shown = read(path, steps, places, tmp_path)
     assert shown["title"] == HOSTILE
-    last, point, gap, _, before, second, scaled, empty = shown["found"]
+    last, point, gap, _, before, second, pulled, scaled, empty = shown["found"]
     largest, high = float(one.pressure[4].max()), float(one.pressure[1:].max())
     expected = to_hex(colormaps["viridis_r"](min(int(largest / high * 256), 255)))
     distance = [abs(int(last["colours"][0][k : k + 2], 16) - int(expected[k : k + 2], 16)) for k in (1, 3, 5)]
@@ -90,6 +95,9 @@ def test_page__shows_in_a_browser_what_the_results_contain(tmp_path):
     assert f"Contact fraction {100 * float(one.contact_fraction[3]):.3g} %" in before["facts"]
     value = float(re.search(r"pressure ([\d.]+) MPa", second["reading"])[1])
     assert value == pytest.approx(2e-6 * float(one.pressure[3, i, j]), rel=1e-3)
+    assert second["colours"][1:] == ["#b8b8b8", to_hex(colormaps["RdBu_r"](0.0))]
+    value = float(re.search(r"pressure (-[\d.]+) MPa, in contact", pulled["reading"])[1])
+    assert value == pytest.approx(-5e-7 * tension, rel=2e-3)
     assert scaled["key"] != second["key"]
     assert empty["colours"] == ["#b8b8b8"] * 3
     assert "missing" in empty["reading"]

@@ -21,6 +21,8 @@ solve = { tolerance = 1e-2, boundary = "periodic" }
 keep = { times = 4 }
 """
 CASE = rv.Case(WAVES, RUBBER, PRESS, boundary="periodic", tolerance=1e-2, times=4)
+STICKY = rv.adhesion(work="50 mJ/m^2", range="2 um")
+PULL = PRESS.load("-1 uN", over="50 ms")
 HEIGHTS = rv.Case(SCAN, RUBBER, PRESS, boundary="mirror", tolerance=1e-2, times=4)
 
 
@@ -124,7 +126,7 @@ PROGRAMS = {"ramp": PRESS, "cycles": PRESS.cycle("10 uN", "3 uN", "0.1 s", 3), "
     [
         rv.from_relaxation("1 MPa", ["2 MPa"], ["10 ms"], kind="tensile"),
         rv.shift(rv.pair(RUBBER, rv.power_law(0.0, 1e-6, 0.4)), 3.0),
-        rv.creep_table([0, 1, 2, 3], [1e-6, 2e-6, 3e-6, 3.5e-6]),
+        rv.creep_table([0, 1, 2, 3], [1e-6, 2e-6, 3e-6, 3.5e-6], kind="shear"),
         rv.layer(rv.elastic(1e9, 0.35), "20 um", on=rv.layer(RUBBER, "1 mm", on=rv.elastic(1e6))),
     ],
     ids=lambda one: "",
@@ -135,6 +137,18 @@ def test_objects__come_back_from_the_study_file(material, program, tmp_path):
     read = rv.read_study(case.to_toml(tmp_path / "study.toml"))
     assert (read.program, read.key) == (program, case.key)
     assert read.body == (material if isinstance(material, rv.Body) else rv.Body(material))
+
+
+def test_adhesion__comes_back_from_the_study_file_and_counts_in_the_key(tmp_path):
+    case = rv.Case(WAVES, RUBBER, PULL, adhesion=STICKY)
+    read = rv.read_study(case.to_toml(tmp_path / "study.toml"))
+    assert (read.settings.adhesion, read.program, read.key) == (STICKY, PULL, case.key)
+    assert rv.vary(case, {"adhesion.work": "60 mJ/m^2"}).key != case.key
+    weak, strong = rv.vary(CASE, {"adhesion": {"weak": STICKY, "strong": rv.adhesion(work=0.1, range=2e-6)}})
+    assert (weak.varied, strong.settings.adhesion.work) == ({"adhesion": "weak"}, 0.1)
+    assert rv.vary(CASE, {"adhesion": {"work": "50 mJ/m^2", "range": 2e-6}}).key == weak.key != strong.key
+    for none in (None, rv.adhesion(work=0, range=1)):
+        assert rv.vary(weak, {"adhesion": none}).key == CASE.key != weak.key
 
 
 def test_vary__makes_the_product_and_pairs_and_names_objects():
@@ -184,6 +198,10 @@ class OwnKernel(type(rv.Body(RUBBER).kernel)):
         (lambda: rv.Case(WAVES, RUBBER, rv.Program), "program"),
         (lambda: rv.Case(WAVES, RUBBER, PRESS, tolerance=2), "tolerance"),
         (lambda: rv.Case(WAVES, RUBBER, PRESS, times=[0, 3]), "times"),
+        (lambda: rv.Case(WAVES, RUBBER, PRESS, adhesion=0.05), "adhesion"),
+        (lambda: rv.vary(CASE, {"adhesion": 0.05}), "adhesion"),
+        (lambda: rv.Case(WAVES, rv.sheet(RUBBER, "20 um"), PRESS, adhesion=STICKY), "adhesion"),
+        (lambda: rv.Case(WAVES, RUBBER, PULL), "program.2.load"),
         (lambda: rv.Case(WAVES, RUBBER, PRESS, observe={"leak": {}}), "observe.leak"),
         (lambda: rv.vary(CASE, {"tolerance": [1e-2, 4]}), "tolerance"),
         (lambda: rv.vary(CASE, {"solve.tolerance": 4}), "solve.tolerance"),
