@@ -93,7 +93,8 @@ SEEN = {
     "quickstart-maps": (
         "Four maps of the contact pressure: spots of contact on an empty ground, more and larger from 50 ms to 500 ms",
         "The load is constant from 50 ms on. New spots appear and old ones spread, while the pressure in the first "
-        "ones falls: creep turns a few highly loaded peaks into many.",
+        "ones falls: creep turns a few highly loaded peaks into many. This holds for a dusty, wet or lubricated rubber; "
+        "a clean, dry one would stick ([audit](howto/audit.md#example-the-quick-start)).",
     ),
     "quickstart-history": (
         "Five curves over time: force, approach, contact area, mean gap and work",
