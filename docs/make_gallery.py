@@ -73,10 +73,10 @@ FIGURES = {
 }
 #: Figure in figures/ -> the script that draws it, with its arguments.
 SCRIPTS = {
-    "maxwell_step": ["maxwell_step.py"],
-    "zener_step": ["zener_step.py"],
-    "thin_sheet": ["thin_sheet.py"],
-    "coating": ["coating.py"],
+    "maxwell_step": ["maxwell_step.py", "128"],
+    "zener_step": ["zener_step.py", "128"],
+    "thin_sheet": ["thin_sheet.py", "128"],
+    "coating": ["coating.py", "80"],
     "tyre_on_asphalt": ["tyre_on_asphalt.py"],
     "stability_map": ["stability_map.py"],
     "measured_rolling": ["measured_and_computed.py", "rolling"],
