@@ -79,10 +79,10 @@ FIGURES = {
 }
 #: Figure in figures/ -> the script that draws it, with its arguments.
 SCRIPTS = {
-    "maxwell_step": ["maxwell_step.py"],
-    "zener_step": ["zener_step.py"],
-    "thin_sheet": ["thin_sheet.py"],
-    "coating": ["coating.py"],
+    "maxwell_step": ["maxwell_step.py", "128"],
+    "zener_step": ["zener_step.py", "128"],
+    "thin_sheet": ["thin_sheet.py", "128"],
+    "coating": ["coating.py", "80"],
     "tyre_on_asphalt": ["tyre_on_asphalt.py"],
     "stability_map": ["stability_map.py"],
     "measured_rolling": ["measured_and_computed.py", "rolling"],
@@ -99,7 +99,8 @@ SEEN = {
     "quickstart-maps": (
         "Four maps of the contact pressure: spots of contact on an empty ground, more and larger from 50 ms to 500 ms",
         "The load is constant from 50 ms on. New spots appear and old ones spread, while the pressure in the first "
-        "ones falls: creep turns a few highly loaded peaks into many.",
+        "ones falls: creep turns a few highly loaded peaks into many. This holds for a dusty, wet or lubricated rubber; "
+        "a clean, dry one would stick ([audit](howto/audit.md#example-the-quick-start)).",
     ),
     "quickstart-history": (
         "Five curves over time: force, approach, contact area, mean gap and work",
