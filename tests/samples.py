@@ -6,6 +6,7 @@ import numpy as np
 
 import roughvisc as rv
 from roughvisc.mechanics.body import HALF_SPACE, Kernel
+from roughvisc.mechanics.materials import MODELS
 
 #: Contact modulus 1.
 UNIT = rv.elastic(0.25)
@@ -31,6 +32,9 @@ OF_EACH_KIND = {
     "from_relaxation": rv.from_relaxation(1e6, [2e6], [0.1], bulk_modulus=2e9),
     "power_law": rv.power_law(0.2, 1.5, 0.3, time_scale=4.0, poisson=0.4),
     "pure power law": rv.power_law(0.0, 1.0, 0.7),
+    "creep_series": MODELS["creep_series"](
+        0.5, 0.1, (2.0, 1.0), (0.3, 20.0), 0.3, error=1e-4, shortest=1e-6, longest=1e6
+    ),
     "fractional_zener": rv.fractional_zener(4.0, 1.0, 0.5, 0.4, poisson=0.3),
     "creep_table": rv.creep_table((0.0, 0.5, 2.0, 30.0, 1e3), (0.1, 0.4, 0.9, 1.1, 7.0), poisson=0.2, kind="shear"),
     "noisy table": rv.creep_table((0.5, 1.0, 30.0, 1e3), (1e-7, 2e-7, 1.99e-7, 8e-7), noise=0.1, kind="shear"),

@@ -27,7 +27,7 @@ ADDED = {
     },
     "material": {
         "mechanics/materials/__init__.py": {
-            "dynamic_table, pair)\n": "_OTHERS = (*_OTHERS, gel)\n",
+            "    pair,\n)\n": "_OTHERS = (*_OTHERS, gel)\n",
             "import creep_table, dynamic_table, relaxation_table\n": """from roughvisc.units import Quantity, quantities
 
 

@@ -46,7 +46,7 @@ def test_result__has_rows_observables_and_figures_over_its_axis(kind):
     total = (clusters.cluster_count * clusters.cluster_area_mean).fillna(0)
     np.testing.assert_allclose(total, known.contact_area_counted)
     own = {"load": {"history"}, "slide": {"history", "slide"}, "friction": {"friction"}}[kind]
-    assert {name for name, *_ in figures_of(ds)} == {"maps", "section", "surface", *own}
+    assert {"maps", "section", "surface", *own} <= {name for name, *_ in figures_of(ds)}
 
 
 @pytest.mark.parametrize("kind", ["slide", "friction"])

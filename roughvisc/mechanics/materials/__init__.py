@@ -10,6 +10,14 @@ from roughvisc.mechanics.materials.models import creep_series, elastic, from_rel
 from roughvisc.mechanics.materials.tables import creep_table, dynamic_table, relaxation_table
 
 _SERIES = (elastic, maxwell, kelvin_voigt, zener, from_relaxation, Prony)
-_OTHERS = (power_law, fractional_zener, creep_series, creep_table, relaxation_table, dynamic_table, pair)
+_OTHERS = (
+    power_law,
+    fractional_zener,
+    creep_series,
+    creep_table,
+    relaxation_table,
+    dynamic_table,
+    pair,
+)
 #: Function of each model of a material that a study may name; its arguments are the keys of the table.
 MODELS: dict[str, Callable[..., Material]] = {one.__name__.lower(): one for one in (*_SERIES, *_OTHERS)}
