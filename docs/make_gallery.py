@@ -144,6 +144,16 @@ SEEN = {
         "The same cases: the contact area hardly depends on the thickness, because the waves that decide it are "
         "shorter than 0.1 mm.",
     ),
+    "tack-work": (
+        "Work against the time of retraction for three times of hold: three rising lines, the longest hold on top",
+        "A longer hold lets the gel creep into contact and makes the separation more costly. So does a slower "
+        "retraction, up to 3 s: the contact still grows while it is pulled.",
+    ),
+    "tack-force": (
+        "Force and contact area against approach for one case: tension grows in the hold, and falls on retraction",
+        "The approach is held at 60 nm, where the area grows more than threefold and the tension with it. On retraction "
+        "the tension passes its largest value, the pull-off, and contact ends at 100 nm above first touch.",
+    ),
     "stop_and_go-friction": (
         "Friction coefficient and contact area against distance, with jumps at 0.6 mm, the rest, and at 1.2 mm, "
         "the reversal",

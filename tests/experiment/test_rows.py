@@ -47,10 +47,18 @@ def assert_constant_load_or_approach_works_through_the_approach(ds, steps, progr
             assert (during.work - during.work[0]).values == pytest.approx(work.values, abs=error)
 
 
-@pytest.mark.parametrize("program", PROGRAMS)
+def is_slow(material, program):
+    """Return whether a case takes long, or is much like others."""
+    return material in ("maxwell", "own") or (material == "kelvin_voigt" and "slide" in program)
+
+
 @pytest.mark.parametrize(
-    "material",
-    [pytest.param(one, marks=pytest.mark.thorough if one in ("maxwell", "own") else ()) for one in MATERIALS],
+    ("material", "program"),
+    [
+        pytest.param(material, program, marks=pytest.mark.thorough if is_slow(material, program) else ())
+        for material in MATERIALS
+        for program in PROGRAMS
+    ],
 )
 def test_every_row__states_an_error_and_agrees_with_its_fields_and_steps(material, program):
     pressed = PROGRAMS[program]

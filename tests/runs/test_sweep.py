@@ -99,7 +99,7 @@ def test_run__shows_each_warning_once_and_names_its_case(study, tmp_path, worker
     command = [*RUN, "ball.toml", "--workers", str(workers)]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     (line,) = (line for line in (done.stdout + done.stderr).splitlines() if "slope" in line)
-    assert line.startswith(("case 1 (program.0.load = 20 mN): ", "case 2 (program.0.load = 30 mN): "))
+    assert line.startswith(("case 1 (20 mN): ", "case 2 (30 mN): "))
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -137,7 +137,7 @@ def test_sweep__a_failing_case_stops_nothing_and_is_not_tried_again(study, tmp_p
 def test_sweep__an_error_of_the_program_is_kept_with_its_traceback(study, tmp_path, monkeypatch):
     cases = study()
 
-    def broken(case, folder, **settings):
+    def broken(*case, **settings):
         return 1 / 0
 
     monkeypatch.setattr(run_module, "compute", broken)
@@ -157,7 +157,7 @@ def test_sweep__an_error_of_the_program_is_kept_with_its_traceback(study, tmp_pa
 def test_sweep__what_was_in_the_way_is_tried_again(study, tmp_path, monkeypatch, error):
     cases = study()
 
-    def hindered(case, folder, **settings):
+    def hindered(*case, **settings):
         raise error
 
     monkeypatch.setattr(run_module, "compute", hindered)

@@ -10,7 +10,7 @@ from roughvisc.study import first_study as first_module
 from roughvisc.study.first_study import first_pressure
 from roughvisc.topography.conditioning import condition
 from roughvisc.topography.grid import spacing
-from roughvisc.topography.inspection import inspect
+from roughvisc.topography.inspection import inspection_of
 
 
 def touching(surface, pressure, compliance):
@@ -27,7 +27,7 @@ def test_first_pressure__brings_five_per_cent_into_contact(monkeypatch, hurst, m
     """A rubber of 3 and 1 MPa has the contact compliance 1 / 3 MPa in the end."""
     monkeypatch.setattr(first_module, "MOST_PRESSED", most)
     scan = rv.self_affine((1e-3, 1e-3), (128, 120), hurst=hurst, rms_slope=0.1, shortcut=1.7e-5, seed=3)
-    found = inspect(scan)
+    found = inspection_of(scan)
     assert found.boundary == "periodic"
     first = first_pressure(scan, found)
     assert max(first.shape) == min(most, 128)
@@ -40,14 +40,14 @@ def test_first_pressure__brings_five_per_cent_into_contact(monkeypatch, hurst, m
 
 def test_first_pressure__of_what_is_flat_or_has_plateaus():
     flat = rv.from_array(np.zeros((20, 24)), (1e-6, 1e-6))
-    first = first_pressure(flat, inspect(flat))
+    first = first_pressure(flat, inspection_of(flat))
     assert (first.pressure, first.late) == (1e3, 1.0)
     assert first.miss
     heights = np.zeros((33, 33))
     heights[:, 11:22] = -1e-6  # the other two thirds touch under any pressure
     plateaus = rv.from_array(heights, (1e-6, 1e-6))
-    first = first_pressure(plateaus, inspect(plateaus))
+    first = first_pressure(plateaus, inspection_of(plateaus))
     assert first.pressure > 0
     assert first.late > 0.6
     assert "5 % requested" in first.miss
-    assert not first_pressure(plateaus, inspect(plateaus), 0.8).miss
+    assert not first_pressure(plateaus, inspection_of(plateaus), 0.8).miss
