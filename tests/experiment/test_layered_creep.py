@@ -61,7 +61,9 @@ def test_contact_that_grows_and_recedes__is_that_of_a_dense_sum_over_past_steps(
     assert areas[0] <= areas[1] >= areas[3]
 
 
-@pytest.mark.parametrize("boundary", ["free", "periodic", "mirror"])
+@pytest.mark.parametrize(
+    "boundary", ["free", *(pytest.param(one, marks=pytest.mark.thorough) for one in ("periodic", "mirror"))]
+)
 @pytest.mark.parametrize("material", [TWICE, rv.maxwell(1e6, 3e5), rv.kelvin_voigt(1e6, 1e5)], ids=repr)
 def test_nearly_equal_materials__are_a_half_space(material, boundary):
     """Times that differ by a part in a million need the memory of waves, and change nothing."""

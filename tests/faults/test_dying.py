@@ -30,7 +30,9 @@ def wanted(case, tmp_path):
 
 
 @pytest.mark.timeout(7200)  # the large one: some 700 runs
-@pytest.mark.parametrize("most", ["2", pytest.param("all", marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "most", [pytest.param("2", marks=pytest.mark.thorough), pytest.param("all", marks=pytest.mark.long)]
+)
 def test_at_a_file_operation(case, wanted, tmp_path, most):
     lines = struck(tmp_path / "ball.toml", tmp_path, most, *WAYS)
     assert len(lines) == 2 * len(WAYS) if most == "2" else len(lines) > 30 * len(WAYS)

@@ -152,6 +152,7 @@ def test_process_of_a_pool__that_is_killed_is_one_sentence():
         in_parallel(os._exit, [9, 9], 2, "drawing")
 
 
+@pytest.mark.thorough
 def test_locale_without_letters__damages_no_result(swept, tmp_path):
     """As a batch system starts a process: the names of files are ASCII."""
     folder = tmp_path / "größe"
