@@ -76,7 +76,7 @@ def errors_in_words(row: xr.Dataset, name: str) -> str:
     if variable.error in row and float(row[variable.error]) != 0:  # zero if prescribed
         size = float(row[variable.error])
         parts.append(("numerical", percent(size / value) if value > 0 else readable(size, variable.units), size))
-    if variable.grid_error in row:
+    if variable.grid_error in row and value > 0:
         size = float(row[variable.grid_error])
         parts.append(("grid", percent(size), size))
     known = ", ".join(f"{kind} {text}" for kind, text, size in parts if math.isfinite(size))
