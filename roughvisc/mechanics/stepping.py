@@ -428,7 +428,8 @@ def accepted(
 
     def at_least(error: Difference, point: Point) -> Difference:
         left = memory.remaining(point.time - fine.time)
-        return error.at_least(former, left, left_of_friction(scene, fine, point, slide), is_soft=pair.is_soft)
+        of_friction = left_of_friction(scene, fine, point, slide) if former.friction > 0 else 0.0
+        return error.at_least(former, left, of_friction, is_soft=pair.is_soft)
 
     error = at_least(error, pair.second)
 

@@ -22,7 +22,7 @@ from roughvisc.variables import AXES, VARIABLES, axis_of, in_table
 
 log = logging.getLogger("roughvisc")
 
-#: File with the table of the last sweep.
+#: Name of the file with the table of the last sweep.
 CASES = "cases.csv"
 
 

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("roughvisc")
 
-#: Time in which a cluster on this machine starts: imports of its processes. [s]
+#: Time that a cluster on this machine needs to start, mostly for the imports of its processes. [s]
 _START = 3.0
 
 

@@ -45,7 +45,7 @@ log = logging.getLogger("roughvisc")
 
 #: File with the index.
 INDEX = ".index.json.gz"
-#: File with the cases of the last sweep.
+#: Name of the file that lists the cases of the last sweep.
 SWEEP = ".cases.json.gz"
 #: Coordinate with the key of the case.
 CASE_KEY = "case_key"
