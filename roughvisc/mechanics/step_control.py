@@ -125,7 +125,7 @@ class Controller:
         """
         factor = max(ratio, 1e-300) ** (-1 / ORDER)
         is_too_long = REJECTED < ratio < self.refused
-        misses = 1 < at_row < self.refused_at_row
+        misses = 1 < at_row < self.refused_at_row and ratio > 1  # shorter steps reduce no error from before the pair
         if taken > self.shortest:
             if opens:
                 return self, SHRINK * taken
@@ -263,7 +263,10 @@ def added(scene: Scene, pair: Pair, number: int, following: float, scales: tuple
         remains = 1.0 if receding else remains
     else:
         change = min(change, float(abs(at_end - memory.remaining(taken) * at_start).sum()))
-        remains = max(memory.remaining(following - second.time), LEAST_REMAINING)
+        ahead, left = following - second.time, 1.0
+        if not by_load:  # what relaxes within the pair is no longer part of the change
+            ahead, left = following - pair.start.time, memory.remaining(taken)
+        remains = max(memory.remaining(ahead) / left if left > 0 else 0.0, LEAST_REMAINING)
     error = change * scene.grid.cell_area / scales[0] * remains
     if by_load:
         of_approach = (second.approach - once.approach) - (pair.start.approach - pair.coarse_start.approach)

@@ -122,3 +122,16 @@ def test_friction_error__of_a_stroke_of_one_cell_is_the_whole_force():
     error = abs(float(coarse.friction_force[-1] - fine.friction_force[-1]))
     assert error > 0.05 * float(fine.friction_force[-1])
     assert error <= float(coarse.friction_force_error[-1])
+
+
+@pytest.mark.filterwarnings("ignore:.* state an error above the tolerance")
+def test_hold__takes_no_shorter_steps_because_of_the_error_of_the_slide_before():
+    """A slide takes one cell a step. Its error is above the tolerance, and no step of the hold can reduce it."""
+
+    def convolutions(program):
+        surface, solid = rv.sphere(1.0, 1.6, 17), rv.kelvin_voigt(1.0, 0.3)
+        ds = rv.simulate(surface, solid, program, boundary="periodic", tolerance=3e-2, progress=False)
+        return ds.roughvisc.steps.convolutions.sum()
+
+    press = rv.Program().load(0.02, over=0.2)
+    assert convolutions(press.slide(0.2, speed=1.0).hold(0.1)) < 4 * convolutions(press.hold(0.3))
