@@ -428,7 +428,10 @@ def accepted(
 
     def at_least(error: Difference, point: Point) -> Difference:
         left = memory.remaining(point.time - fine.time)
-        of_friction = left_of_friction(scene, fine, point, slide) if former.friction > 0 else 0.0
+        of_friction = 0.0
+        if slide is not None and former.friction > 0:
+            of_friction, unresolved = left_of_friction(scene, fine, point, slide)
+            error = replace(error, friction=max(error.friction, unresolved))
         return error.at_least(former, left, of_friction, is_soft=pair.is_soft)
 
     error = at_least(error, pair.second)

@@ -174,6 +174,14 @@ def test_friction_of_a_hold_after_a_slow_slide(steps):
     assert_states_enough(ds, off / largest, ds.friction_force_error.values / largest)
 
 
+def test_friction_that_is_gone_within_a_step():
+    """In a long step the friction force of both solutions passes through zero while some of it is left."""
+    kept = [1, 1 + 0.0027, 1 + 0.0072, 1 + 0.019, 1 + 0.052, 1 + 0.14, 2]
+    ds, _, off, friction = sliding(8, 16, 0.022, 0.32, kept)
+    largest = np.abs(friction).max()
+    assert_states_enough(ds, off / largest, ds.friction_force_error.values / largest)
+
+
 # ---------------------------------------------------------------------------------------------------------------- work
 
 
