@@ -116,6 +116,10 @@ def simulate(
     ConvergenceError
         If the contact of a step is not solved; the message states the time, the error and what to try.
 
+    See Also
+    --------
+    roughvisc.friction, roughvisc.Case, roughvisc.Program, roughvisc.observables.history
+
     Examples
     --------
     >>> import roughvisc as rv
@@ -207,6 +211,10 @@ def friction(
         If the input is invalid, or the material creeps without limit and the profile varies across the motion.
     ConvergenceError
         If the contact at a speed is not solved; the message states the speed, the error and what to try.
+
+    See Also
+    --------
+    roughvisc.simulate, roughvisc.SteadySliding, roughvisc.plot.friction, roughvisc.friction_theory
 
     Notes
     -----
@@ -305,6 +313,21 @@ def run(
         recorded.
     ConvergenceError
         If the contact of a step or at a speed is not solved; no result is written.
+
+    See Also
+    --------
+    roughvisc.simulate, roughvisc.sweep, roughvisc.Case, roughvisc.open_result
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=15), rv.Program().load(1e-5, over="1 s")
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ds = rv.run(case, folder, progress=False).load()
+    >>> ds.attrs["case_key"] == case.key
+    True
     """
     from roughvisc.runs.netcdf import open_result
     from roughvisc.runs.run import result_folder

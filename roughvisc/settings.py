@@ -56,6 +56,10 @@ class Numerics:
     InputError
         If a value is invalid.
 
+    See Also
+    --------
+    roughvisc.simulate, roughvisc.friction
+
     Examples
     --------
     >>> Numerics(time_step="10 ms")

@@ -93,6 +93,10 @@ class SteadySliding(Experiment):
     InputError
         If a value is invalid, or both or neither of load and pressure are given.
 
+    See Also
+    --------
+    roughvisc.friction, roughvisc.Case
+
     Examples
     --------
     >>> SteadySliding(speeds=[1e-3, 1.0], load=2.0)

@@ -117,6 +117,10 @@ def plan(
     InputError
         If the study file is invalid.
 
+    See Also
+    --------
+    roughvisc.run, roughvisc.sweep, roughvisc.trade
+
     Notes
     -----
     A case runs on at most 128 cells a side, with its own tolerance and kept times; a friction curve on 48, at some of
@@ -124,6 +128,14 @@ def plan(
     run; Persson's theory corrects it for the slopes that the coarse grid does not resolve. The time follows from a few
     iterations on the real grid. The time is accurate to a factor of 2, memory to 1.3, disk and contact fraction to 1.2.
     In a sweep with many cases some have no coarse run, and the coarse run of the nearest case in the list is used.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=15), rv.Program().load(1e-5, over="1 s")
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
+    >>> rv.plan(case).sizes["case"]
+    1
     """
     cases = cases_given(cases)
     folder, there = result_folder(cases[0], out), memory_available(cases[0].settings.device)

@@ -76,6 +76,10 @@ def friction_theory(
     ConvergenceError
         If the temperatures at a speed are not found.
 
+    See Also
+    --------
+    roughvisc.friction, roughvisc.psd_table, roughvisc.Heating, roughvisc.observables.persson
+
     Notes
     -----
     With the density :math:`C(q)` of :func:`roughvisc.psd` and means over the directions of the waves,

@@ -67,6 +67,22 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
     ------
     InputError
         If there are zero results, or a Dataset comes without `out`.
+
+    See Also
+    --------
+    roughvisc.plot.page, roughvisc.to_table
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball = rv.sphere(radius=1e-3, size=2e-4, shape=15)
+    >>> press = rv.Program().load(1e-4, over=0)
+    >>> ds = rv.simulate(ball, rv.elastic(1e6), press, times=[0.0], fields=(), progress=False)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     page = rv.report(ds, f"{folder}/ball.html").read_text(encoding="utf-8")
+    >>> "<html" in page
+    True
     """
     page: dict[str, Any] = {
         "rows": "times or speeds",

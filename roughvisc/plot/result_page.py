@@ -100,10 +100,26 @@ def page(results: str | Path | xr.Dataset, out: str | Path | None = None) -> Pat
     InputError
         If there are zero results, or something else than a result.
 
+    See Also
+    --------
+    roughvisc.report, roughvisc.plot.animate
+
     Notes
     -----
     The page shows every field over (time, x, y) or (speed, x, y) in the results. For the flow of a fluid, merge it:
     ``rv.plot.page(ds.merge(rv.observables.leakage(ds, flow=True)))``.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> wave = rv.wavy("1 um", "0.1 mm", "0.1 mm", 16)
+    >>> press = rv.Program().pressure("20 kPa", over="1 s")
+    >>> ds = rv.simulate(wave, rv.elastic(1e6), press, times=3, progress=False)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     page = rv.plot.page(ds, f"{folder}/wave.html").read_text(encoding="utf-8")
+    >>> "<html" in page
+    True
     """
     sources, default = _sources(results)
     out = default if out is None else path_of(out, "out")

@@ -56,6 +56,22 @@ def observe(
     ------
     InputError
         If a quantity cannot be computed from a result; its file is not changed. If the default client is asynchronous.
+
+    See Also
+    --------
+    roughvisc.run, roughvisc.sweep, roughvisc.observables
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=15), rv.Program().load(1e-5, over="1 s")
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ds = rv.run(case, folder, progress=False).load()
+    ...     changed = rv.observe([rv.vary(case, {"observe": {"conductance": {"resistivity": [0.2, 0.0]}}})], folder)
+    >>> len(changed)
+    1
     """
     cases = cases_given(cases)
     distinct = {case.key: case for case in cases if case.observed}

@@ -101,6 +101,22 @@ def sweep(
     RoughviscError
         If no case could be finished. If some cases fail, they are recorded in the folder and logged as warnings. A case
         that needs more memory than its worker has is refused and not recorded, because it may fit elsewhere.
+
+    See Also
+    --------
+    roughvisc.vary, roughvisc.open_results, roughvisc.to_table, roughvisc.plot.sweep
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=15), rv.Program().load(1e-5, over="1 s")
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
+    >>> cases = rv.vary(case, {"material.shear_modulus": ["2 MPa", "4 MPa"]})
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     results = rv.sweep(cases, folder, workers=0, progress=False).load()
+    >>> results.material_shear_modulus.values.tolist()
+    [2000000.0, 4000000.0]
     """
     cases = cases_given(cases)
     folder = result_folder(cases[0], out).absolute()

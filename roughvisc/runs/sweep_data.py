@@ -291,10 +291,22 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.
     InputError
         If the folder contains no result, or some results lie over time and others over speed.
 
+    See Also
+    --------
+    roughvisc.sweep, roughvisc.to_table, roughvisc.open_result
+
     Examples
     --------
-    >>> results = rv.open_results("results/load_sweep")  # doctest: +SKIP
-    >>> results.set_index(case=["program_0_load", "surface_seed"]).unstack("case").contact_area  # doctest: +SKIP
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=15), rv.Program().load(1e-5, over="1 s")
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
+    >>> cases = rv.vary(case, {"tolerance": [1e-1, 1e-2]})
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     first = rv.run(cases[0], folder, progress=False)
+    ...     results = rv.open_results(folder, cases=cases).load()
+    >>> results.case.values.tolist()  # the second case is not finished
+    [0]
     """
     folder = path_of(out, "out", "a folder of results").absolute()
     index = index_of(folder)

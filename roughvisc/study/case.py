@@ -432,6 +432,21 @@ def read_study(path: str | Path) -> Case:
     InputError
         If the file cannot be read, if a key or a value is unknown, missing, impossible or in a wrong unit, or if the
         file contains a sweep: see :func:`read_cases`.
+
+    See Also
+    --------
+    roughvisc.read_cases, roughvisc.Case
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=15), rv.Program().load(1e-5, over="1 s")
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     again = rv.read_study(case.to_toml(f"{folder}/ball.toml"))
+    >>> again.key == case.key
+    True
     """
     cases = read_cases(path)
     if len(cases) > 1 or cases[0].varied:
@@ -464,6 +479,24 @@ def read_cases(path: str | Path) -> list[Case]:
     ------
     InputError
         As :func:`read_study` does, for the first case that is wrong; or if a time is after the end of every program.
+
+    See Also
+    --------
+    roughvisc.read_study, roughvisc.vary, roughvisc.sweep
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=15), rv.Program().load(1e-5, over="1 s")
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     study = case.to_toml(f"{folder}/ball.toml")
+    ...     with study.open("a") as file:
+    ...         _ = file.write('[sweep]\\n"program.0.load" = ["5 uN", "10 uN"]\\n')
+    ...     cases = rv.read_cases(study)
+    >>> [one.varied for one in cases]
+    [{'program.0.load': 5e-06}, {'program.0.load': 1e-05}]
     """
     path = path_of(path, "path", "a study file")
     data = read_toml(path, "a study in TOML")

@@ -52,6 +52,10 @@ def read_program(path: str | Path, **columns: Any) -> Program:
         If the file or a column cannot be read, times do not increase, or loads are below zero by more than noise (1 %
         of the largest load); the message names the line.
 
+    See Also
+    --------
+    roughvisc.Program, roughvisc.read_record
+
     Notes
     -----
     Columns may be separated by semicolons, tabs, commas or blanks. The heading is the first line that contains both
@@ -60,6 +64,17 @@ def read_program(path: str | Path, **columns: Any) -> Program:
     JPK has names and units in comments before each segment, such as ``"Series Time"`` and ``"Vertical Deflection"``.
 
     Adhesion is not modelled: a record with a pull-off ends at the end of its hold.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     with open(f"{folder}/machine.csv", "w") as file:
+    ...         _ = file.write("time [s]; load [mN]\\n0; 0\\n1; 2\\n2; 2\\n")
+    ...     program = rv.read_program(f"{folder}/machine.csv", time="time")
+    >>> program
+    Program: load to 2 mN over 1 s, load to 2 mN over 1 s
     """
     control, times, values, note = read_history(path, **columns)
     return Program.table(times, values, control, note)

@@ -70,13 +70,20 @@ def read_material(
         If the file, a column or a unit is missing or ambiguous, or the function of the model refuses the rows; the
         message names the file and the line.
 
+    See Also
+    --------
+    roughvisc.creep_table, roughvisc.relaxation_table, roughvisc.dynamic_table
+
     Examples
     --------
+    >>> import tempfile
     >>> import roughvisc as rv
-    >>> names = {"frequency": "f [Hz]", "storage": "E'", "loss": "E''"}
-    >>> rubber = rv.read_material(  # doctest: +SKIP
-    ...     "dma.csv", "dynamic_table", columns=names, kind="tensile"
-    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     with open(f"{folder}/creep.csv", "w") as file:
+    ...         _ = file.write("time [s], J [1/MPa]\\n0.1, 1\\n1, 1.5\\n10, 2\\n")
+    ...     rubber = rv.read_material(f"{folder}/creep.csv", "creep_table", columns={"compliance": "J"}, kind="shear")
+    >>> bool(abs(rubber.creep_compliance(1.0) - 1.5e-6) < 1e-7)
+    True
     """
     one_of("model", model, COLUMNS)
     stated = {"model": model, "file": str(file), "columns": columns, "part": part, **arguments}

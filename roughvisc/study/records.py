@@ -91,6 +91,10 @@ def read_record(
     InputError
         If the file or a column cannot be read, times do not increase, the stiffness is absent, or no force is positive.
 
+    See Also
+    --------
+    roughvisc.fit_material, roughvisc.read_program
+
     Notes
     -----
     The approach ends where the force or the depth reaches 98 % of its largest value. The retraction begins where the
@@ -101,8 +105,14 @@ def read_record(
 
     Examples
     --------
-    >>> record = rv.read_record("curve.txt")  # doctest: +SKIP
-    >>> record["force"] = record.force - record.force[:500].median()  # doctest: +SKIP
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     with open(f"{folder}/curve.csv", "w") as file:
+    ...         _ = file.write("time [s], force [uN], approach [um]\\n0, 0, 0\\n1, 1, 1\\n2, 3, 2\\n3, 1, 1\\n")
+    ...     record = rv.read_record(f"{folder}/curve.csv")
+    >>> record.force.max().item()
+    3e-06
     """
     path = path_of(path, "path")
     try:
@@ -258,6 +268,10 @@ def fit_material(
         with a noise of more than 5e-4 of the largest one (of the mean of rows beyond 600); if it does not determine the
         modulus at any time, or a requested time of a term.
 
+    See Also
+    --------
+    roughvisc.read_record, roughvisc.closed_forms.lee_radok
+
     Notes
     -----
     While the contact grows, with :math:`k = 8 \sqrt R / 3 (1 - \nu)` and :math:`n = 3/2` for a sphere of radius
@@ -277,9 +291,18 @@ def fit_material(
 
     Examples
     --------
-    >>> bead = rv.sphere("10 um", "12 um", 64)  # doctest: +SKIP
-    >>> fit = rv.fit_material(rv.read_record("curve.txt"), bead)  # doctest: +SKIP
-    >>> ds = rv.simulate(bead, fit.material, fit.program(record), boundary="free")  # doctest: +SKIP
+    >>> import numpy as np
+    >>> import roughvisc as rv
+    >>> import xarray as xr
+    >>> time = np.linspace(0.0, 2.0, 201)
+    >>> depth = 1e-6 * np.minimum(time, 1.0)
+    >>> force = 16 / 3 * 1e3 * 1e-5**0.5 * depth**1.5  # Hertz, for a shear modulus of 1 kPa
+    >>> segment = np.where(time < 1.0, "approach", "hold")
+    >>> rows = {"force": ("time", force), "approach": ("time", depth), "segment": ("time", segment)}
+    >>> record = xr.Dataset(rows, {"time": time}).set_coords("segment")
+    >>> fit = rv.fit_material(record, rv.sphere("10 um", "12 um", 16), contact_point=0.0)
+    >>> round(1 / float(fit.material.creep_compliance(0.0)), 3)
+    1000.0
     """
     check_poisson(poisson)
     one_of("kind", kind, ("auto", "relaxation", "creep"))

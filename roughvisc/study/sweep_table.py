@@ -240,6 +240,10 @@ def over_realisations(values: xr.DataArray) -> xr.Dataset:
     InputError
         If the quantity has no dimension ``realisation``.
 
+    See Also
+    --------
+    roughvisc.sweep, roughvisc.surrogates
+
     Notes
     -----
     Values that are not finite count as missing. If all other values are positive, both intervals are intervals of the

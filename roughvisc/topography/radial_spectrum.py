@@ -64,6 +64,10 @@ def psd_table(wavevectors: Sequence[Quantity], densities: Sequence[Quantity], *,
         If the columns differ in length, a wave number is not positive or not ascending, a density is negative or not
         finite, or the convention is unknown.
 
+    See Also
+    --------
+    roughvisc.psd, roughvisc.join_psd, roughvisc.from_spectrum, roughvisc.friction_theory
+
     Examples
     --------
     >>> import roughvisc as rv
@@ -102,6 +106,19 @@ def join_psd(*spectra: xr.Dataset | xr.DataArray) -> xr.Dataset:
     -----
     UserWarning
         If two densities differ by more than a factor of two in the mean over their overlap.
+
+    See Also
+    --------
+    roughvisc.psd, roughvisc.psd_table, roughvisc.friction_theory
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> long_waves = rv.psd_table([1e3, 1e5], [1e-15, 1e-22], convention="psd")
+    >>> short_waves = rv.psd_table([1e4, 1e6], [3.2e-19, 3.2e-26], convention="psd")
+    >>> q = rv.join_psd(long_waves, short_waves).wavevector
+    >>> round(float(q.min())), round(float(q.max()))
+    (1000, 1000000)
     """
     if not spectra:
         raise InputError(key="spectra", found=spectra, expected="at least one spectrum or map of heights")

@@ -216,6 +216,17 @@ def from_array(heights: Any, spacing: Quantity | tuple[Quantity, Quantity]) -> x
     InputError
         If the array is not two-dimensional with at least two points along each axis, or contains infinite heights or
         no valid ones.
+
+    See Also
+    --------
+    roughvisc.open_scan, roughvisc.from_topography, roughvisc.save_scan
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> h = rv.from_array([[0.0, 1e-6, 2e-6], [1e-6, 2e-6, 3e-6]], spacing=("1 um", "2 um"))
+    >>> h.sel(x=0.5e-6, y=1e-6, method="nearest").item()
+    0.0
     """
     values = np.array(in_metres(heights, "heights"))
     if values.ndim != 2 or min(values.shape) < 2:

@@ -57,6 +57,17 @@ def sphere(radius: Quantity, size: Any, shape: Any) -> xr.DataArray:
     ------
     InputError
         If a parameter is not positive and finite.
+
+    See Also
+    --------
+    roughvisc.cone, roughvisc.flat_punch, roughvisc.closed_forms.hertz
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> ball = rv.sphere(radius="1 mm", size="200 um", shape=45)
+    >>> ball.shape
+    (45, 45)
     """
     return _indenter("sphere", {"radius": radius}, size, shape)
 
@@ -83,6 +94,16 @@ def cone(slope: float, size: Any, shape: Any) -> xr.DataArray:
     ------
     InputError
         If a parameter is not positive and finite.
+
+    See Also
+    --------
+    roughvisc.sphere, roughvisc.flat_punch, roughvisc.closed_forms.cone
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rv.cone(slope=0.1, size="200 um", shape=(41, 41)).shape
+    (41, 41)
     """
     return _indenter("cone", {"slope": slope}, size, shape)
 
@@ -109,6 +130,17 @@ def flat_punch(radius: Quantity, size: Any, shape: Any) -> xr.DataArray:
     ------
     InputError
         If a parameter is not positive and finite, or no cell centre lies within the radius.
+
+    See Also
+    --------
+    roughvisc.sphere, roughvisc.cone, roughvisc.closed_forms.flat_punch
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> punch = rv.flat_punch(radius="50 um", size="200 um", shape=41)
+    >>> punch.attrs["missing"]
+    'absent'
     """
     return _indenter("flat_punch", {"radius": radius}, size, shape)
 
@@ -139,6 +171,17 @@ def wavy(amplitude: Quantity, wavelength: Quantity, size: Any, shape: Any, waves
     ------
     InputError
         If a parameter is not positive and finite, `waves` is neither 1 nor 2, or the waves do not fit the domain.
+
+    See Also
+    --------
+    roughvisc.self_affine, roughvisc.closed_forms.westergaard, roughvisc.closed_forms.johnson_greenwood_higginson
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> wave = rv.wavy(amplitude="1 um", wavelength="1 mm", size="1 mm", shape=64)
+    >>> round(float(rv.parameters(wave, periodic=True).Sq), 9)
+    5e-07
     """
     size = pair("size", size)
     one_of("waves", waves, (1, 2))
@@ -215,6 +258,10 @@ def self_affine(
         If a parameter is out of range, `amplitudes` is unknown, both or none of `rms_slope` and `rms_height` are given,
         or no wavelength of the domain lies between roll-off and short cut-off.
 
+    See Also
+    --------
+    roughvisc.from_spectrum, roughvisc.surrogates, roughvisc.wavy
+
     Notes
     -----
     The spectrum is :math:`C \propto \max(q, q_r)^{-2 - 2H}` for :math:`q < q_s`. Phases are uniform and independent.
@@ -229,6 +276,13 @@ def self_affine(
     ----------
     .. [1] T. D. B. Jacobs, T. Junge, L. Pastewka, Surf. Topogr.: Metrol. Prop. 5 (2017) 013001.
     .. [2] NumPy reference, "Parallel random number generation", SeedSequence spawning.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rough = rv.self_affine("1 mm", 64, hurst=0.8, rms_height="1 um", seed=1)
+    >>> round(float(rv.parameters(rough).Sq), 9)
+    1e-06
     """
     size = pair("size", size)
     stated_seed = None if isinstance(seed, np.random.Generator) else whole("seed", seed)
@@ -304,6 +358,10 @@ def from_spectrum(
     ------
     InputError
         If a parameter is out of range, or no wave of the domain is in the spectrum.
+
+    See Also
+    --------
+    roughvisc.psd_table, roughvisc.self_affine
 
     Notes
     -----
@@ -456,6 +514,10 @@ def surrogates(h: xr.DataArray, count: int, *, seed: int) -> xr.DataArray:
     ------
     InputError
         If points are missing, `count` is not a positive whole number, or `seed` is not valid.
+
+    See Also
+    --------
+    roughvisc.self_affine, roughvisc.over_realisations
 
     Notes
     -----

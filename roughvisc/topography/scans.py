@@ -110,6 +110,17 @@ def open_scan(
     UserWarning
         If the checksum in an X3P file is wrong, an index row or column is removed, a number is taken for missing
         points, or cells of `grid` hold no point.
+
+    See Also
+    --------
+    roughvisc.inspect, roughvisc.level, roughvisc.from_array, roughvisc.supported_formats
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> scan = rv.open_scan(rv.example_scan())
+    >>> scan.shape, scan.attrs["format"]
+    ((160, 256), 'x3p')
     """
     options = {
         "format": format,
@@ -155,6 +166,21 @@ def save_scan(h: xr.DataArray, path: _Path) -> None:
     ------
     InputError
         If the suffix is unknown, or `h` is not a height grid.
+
+    See Also
+    --------
+    roughvisc.open_scan, roughvisc.from_array, roughvisc.to_topography
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> rough = rv.self_affine("1 mm", 32, hurst=0.8, rms_height="1 um", seed=1)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     rv.save_scan(rough, f"{folder}/rough.nc")
+    ...     again = rv.open_scan(f"{folder}/rough.nc")
+    >>> bool((again == rough).all())
+    True
     """
     h, path = checked(h, "save_scan"), path_of(path, "path")
     known_suffix(path)

@@ -112,6 +112,16 @@ def supported_formats() -> dict[str, Sequence[str]]:
     -------
     dict
         Name -> suffixes without the dot, in alphabetical order.
+
+    See Also
+    --------
+    roughvisc.open_scan
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rv.supported_formats()["x3p"]
+    ('x3p',)
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
