@@ -305,9 +305,9 @@ def run(
     Raises
     ------
     InputError
-        If the input is invalid; nothing is written. If a wanted error cannot be reached: the message states the
-        smallest error that can be reached, and its sources. If a quantity in ``[observe]`` cannot be computed from the
-        result; the result is kept.
+        If the input is invalid, or the folder holds the sweep of another study; nothing is written. If a wanted error
+        cannot be reached: the message states the smallest error that can be reached, and its sources. If a quantity in
+        ``[observe]`` cannot be computed from the result; the result is kept.
     TooLargeError
         If the case needs more memory than is available. It is refused before any memory is allocated, and no failure is
         recorded.

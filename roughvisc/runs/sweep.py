@@ -39,7 +39,7 @@ from roughvisc.runs.folder import (
 )
 from roughvisc.runs.observed import observe
 from roughvisc.runs.run import FULL, REFUSED, Outcome, attempt, outcome_of, result_folder, run_case
-from roughvisc.runs.sweep_data import SWEEP, index_of, numbers_of, open_results, sweep_cases
+from roughvisc.runs.sweep_data import SWEEP, index_of, numbers_of, open_results, require_own_folder, sweep_cases
 from roughvisc.solve import Progress
 from roughvisc.study.case import Case, cases_given
 
@@ -95,9 +95,9 @@ def sweep(
     Raises
     ------
     InputError
-        If the input is invalid or the client asynchronous (nothing runs), the call is at the top level of a script,
-        some results lie over time and others over speed, or a quantity in ``[observe]`` cannot be computed from a
-        result (the results are kept).
+        If the input is invalid, the folder holds the sweep of another study, or the client is asynchronous (nothing
+        runs); if the call is at the top level of a script, or some results lie over time and others over speed; or if a
+        quantity in ``[observe]`` cannot be computed from a result (the results are kept).
     RoughviscError
         If no case could be finished. If some cases fail, they are recorded in the folder and logged as warnings. A case
         that needs more memory than its worker has is refused and not recorded, because it may fit elsewhere.
@@ -145,8 +145,10 @@ def run_one(case: Case, folder: Path, *, progress: bool | Progress = False, thre
     Raises
     ------
     InputError
-        If a quantity cannot be computed from the result, which is kept; and as :func:`run_case`.
+        If the folder holds the sweep of another study; if a quantity cannot be computed from the result, which is
+        kept; and as :func:`run_case`.
     """
+    require_own_folder([case], folder)
     path = run_case(case, folder, progress=progress, threads=threads)
     observe([case], folder)
     return path
@@ -160,8 +162,10 @@ def run_study(
     Raises
     ------
     InputError
-        If a quantity cannot be computed from a result, which is kept; and as :func:`run_cases`.
+        If the folder holds the sweep of another study; if a quantity cannot be computed from a result, which is kept;
+        and as :func:`run_cases`.
     """
+    require_own_folder(cases, folder)
     outcomes = run_cases(cases, folder, display=display, client=client, **computing)
     if any(case.observed for case in cases):
         display.say("computes the quantities in [observe]")

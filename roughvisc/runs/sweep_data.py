@@ -243,6 +243,36 @@ def read_sweep(folder: Path) -> dict[str, dict[str, Any]]:
         raise InputError(f"{path}: {found}: expected the cases of a sweep; run it again", key=SWEEP) from error
 
 
+def require_own_folder(cases: Sequence[Case], folder: Path) -> None:
+    """Refuse a folder with the sweep of another study, whose list and table of cases the results would replace.
+
+    A study that has changed has the same title or the same name of its file. Results of single cases do not count,
+    because each has its own name.
+
+    Raises
+    ------
+    InputError
+        If the last sweep in the folder is one of another study.
+    """
+    listed: dict[str, dict[str, Any]] = {}
+    with suppress(InputError):  # a damaged list belongs to no study
+        listed = read_sweep(folder)
+    if not listed or any(case.key in listed for case in cases):
+        return
+    own = set().union(*(_names(case.title, case.origin) for case in cases))
+    other = set().union(*(_names(stated.get("title"), stated.get("origin")) for stated in listed.values()))
+    if own & other:
+        return
+    holds, expected = f"holds the sweep of {', '.join(sorted(other))}", "a folder of this study, or a new one"
+    raise InputError(f"out: {folder}: {holds}: expected {expected}", key="out", found=str(folder), expected=expected)
+
+
+def _names(title: str | None, origin: str | Path | None) -> set[str]:
+    """Return the title and the name of the file of a study, by which it is recognised after a change."""
+    names = {title or "untitled", Path(origin).name if origin else ""} - {""}
+    return names - {"untitled"} or names
+
+
 def numbers_of(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, int]:
     """Return the number of each case, from 0 in their order; the realisations of one case share its number."""
     numbers: dict[str, int] = {}

@@ -2,6 +2,7 @@
 
 import json
 import pickle
+from functools import partial
 
 import numpy as np
 import pytest
@@ -180,6 +181,19 @@ def test_sweep__stores_heights_once_and_its_names_are_coordinates(tmp_path):
     assert len(list(tmp_path.glob("heights-*.nc"))) == 1
     rv.sweep(cases, tmp_path, workers=0, progress=False)
     assert "0 of them to compute" in (tmp_path / "sweep.log").read_text()
+
+
+def test_folder__with_the_sweep_of_another_study_is_refused(tmp_path):
+    first = rv.vary(CASE, {"title": "first"})
+    rv.sweep([first], tmp_path, workers=0, progress=False)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    other = rv.vary(first, {"title": "second", "tolerance": 2e-2})
+    for call in (rv.run, partial(rv.sweep, workers=0)):
+        with refused("out", str(tmp_path)):
+            call(other if call is rv.run else [other], tmp_path, progress=False)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    changed = rv.vary(first, {"tolerance": 2e-2})
+    assert rv.sweep([changed], tmp_path, workers=0, progress=False).sizes["case"] == 1
 
 
 class OwnKernel(type(rv.Body(RUBBER).kernel)):
