@@ -169,6 +169,13 @@ def one_of(key: str, value: Any, words: Iterable[Any]) -> Any:
     return value
 
 
+def count(key: str, value: Any, least: int) -> int | None:
+    """Return a whole number of at least `least`, or None; refuse any other value."""
+    if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < least):
+        raise InputError(key=key, found=value, expected=f"a whole number of at least {least}, or None")
+    return value
+
+
 def listed_names(value: Any) -> tuple[Any, ...]:
     """Return the names of a list of names; a text is one name, and any other value a wrong one."""
     return tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else (value,)

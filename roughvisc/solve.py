@@ -17,7 +17,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy import fft
 
-from roughvisc.errors import InputError
+from roughvisc.arguments import count
 from roughvisc.experiment.accuracy import filled_warning
 from roughvisc.experiment.base import Experiment, Outgrown, Row, Rows
 from roughvisc.experiment.grid_error import with_grid_error
@@ -132,14 +132,12 @@ def solve(
     ConvergenceError
         If the contact of a step or at a speed is not solved.
     """
-    if threads is None:
+    if count("threads", threads, 1) is None:
         from dask.system import CPU_COUNT  # slow to import
 
         threads = int(fft.get_workers())
         is_alone = threading.current_thread() is threading.main_thread() and multiprocessing.parent_process() is None
         threads = CPU_COUNT if threads == 1 and is_alone else threads
-    elif isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
-        raise InputError(key="threads", found=threads, expected="a whole number of at least 1, or None")
     problem = experiment.resolved(problem)
     height, settings = problem.height, problem.settings
     # a curve of steady sliding does so itself

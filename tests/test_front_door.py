@@ -145,6 +145,28 @@ def test_wrong_type__is_refused_at_the_argument(function, arguments):
             assert caught.value.key.partition("[")[0].partition(".")[0] == name, wrong
 
 
+SMALL = rv.Case(rv.sphere(1e-3, 2e-4, 9), rv.elastic(1e6), rv.Program().load(1e-6, over=0), title="small")
+
+
+@pytest.mark.parametrize("wrong", [-1, "2", 1.5, True])
+@pytest.mark.parametrize("name", ["workers", "threads"])
+def test_number_of_processes_or_threads__is_refused_at_the_argument(name, wrong, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    functions = [rv.run, rv.sweep, rv.plan, rv.trade, rv.budget, rv.audit, rv.report, rv.simulate]
+    for function in functions:
+        parameters = inspect.signature(function).parameters
+        if name in parameters:
+            given = {
+                rv.sweep: ([SMALL],),
+                rv.report: (WAVE.to_dataset(name="height"), "page.html"),
+                rv.simulate: (WAVE, RUBBER, PRESS),
+            }.get(function, (SMALL,))
+            quiet = {"progress": False} if "progress" in parameters else {}
+            with refused(name, wrong):
+                function(*given, **quiet, **{name: wrong})
+    assert not list(tmp_path.rglob("*.nc"))
+
+
 def test_missing_argument__names_the_function():
     with pytest.raises(TypeError, match=r"^maxwell\(\).*'G'"):
         rv.maxwell(G=1e6, viscosity=1e5)

@@ -29,6 +29,7 @@ from roughvisc.observables.history import expect_result, history
 from roughvisc.runs.netcdf import open_result
 from roughvisc.runs.run import result_folder
 from roughvisc.runs.sweep import run_one
+from roughvisc.solve import Progress
 from roughvisc.study.case import Case, case_given
 from roughvisc.study.properties import properties
 from roughvisc.topography.borders import border_mismatch
@@ -522,7 +523,7 @@ def audit(
     heat_conductivity: Quantity | None = None,
     volumetric_heat_capacity: Quantity | None = None,
     out: str | Path | None = None,
-    progress: bool = True,
+    progress: bool | Progress = True,
     threads: int | None = None,
 ) -> xr.Dataset:
     """Check the assumptions of the model for a result.

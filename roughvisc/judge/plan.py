@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from scipy import fft
 from scipy.special import erf, erfinv
 
+from roughvisc.arguments import count
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.experiment.base import Rows
 from roughvisc.experiment.loading import Loading, LoadingRows
@@ -94,7 +95,7 @@ def plan(
     out : path, optional
         Results folder, to check the disk space. Default: as in :func:`roughvisc.sweep`.
     workers : int, optional
-        Number of parallel processes. Default: one per core, or fewer if the memory is too small.
+        Number of parallel processes; 0: this process. Default: one per core, or fewer if the memory is too small.
 
     Returns
     -------
@@ -138,6 +139,7 @@ def plan(
     1
     """
     cases = cases_given(cases)
+    count("workers", workers, 0)
     folder, there = result_folder(cases[0], out), memory_available(cases[0].settings.device)
     stated = [json.loads(case.to_json()) for case in cases]
     parameters = parameters_of(stated)
@@ -484,7 +486,7 @@ def totals(dataset: xr.Dataset, folder: Path, workers: int | None, there: Availa
     free_disk, total = shutil.disk_usage(place).free, dataset.sizes["case"]
     seconds = np.nan_to_num(dataset["wall_time"].values)
     largest = np.sort(np.nan_to_num(dataset["memory"].values))[::-1]
-    processes = workers or processes_that_fit(largest[0], threads_each(1), there.size)
+    processes = processes_that_fit(largest[0], threads_each(1), there.size) if workers is None else max(workers, 1)
     processes = min(processes, total)
     together, size = float(np.sum(largest[:processes])), float(np.nansum(dataset["disk"].values))
     refusals = [str(text) for text in dataset["refusal"].values if text]

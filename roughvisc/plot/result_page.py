@@ -78,14 +78,14 @@ class _Thinning:
         return _Thinning(max(rows, 1), max(cells, 8))
 
 
-def page(results: str | Path | xr.Dataset, out: str | Path | None = None) -> Path:
+def page(results: str | Path | xr.Dataset, path: str | Path | None = None) -> Path:
     """Write a page to explore results: fields, profiles and histories of every case, in any browser.
 
     Parameters
     ----------
     results : path or xarray.Dataset
         A result file, a folder of result files, one case's result, or a sweep.
-    out : path, optional
+    path : path, optional
         File to write. Default: ``page.html`` in the folder of results, ``STEM-page.html`` next to a result file, or
         ``page.html`` in this folder for a Dataset.
 
@@ -122,7 +122,7 @@ def page(results: str | Path | xr.Dataset, out: str | Path | None = None) -> Pat
     True
     """
     sources, default = _sources(results)
-    out = default if out is None else path_of(out, "out")
+    out = default if path is None else path_of(path, "path")
     thinning = _Thinning(max(source.rows for source in sources), MOST_CELLS)
     while True:
         cases, size = _cases(sources, thinning)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
+from roughvisc.arguments import count
 from roughvisc.errors import InputError, RoughviscError
 from roughvisc.labels import warnings_of
 from roughvisc.runs.cluster import (
@@ -150,7 +151,7 @@ def run_one(case: Case, folder: Path, *, progress: bool | Progress = False, thre
     """
     require_own_folder([case], folder)
     path = run_case(case, folder, progress=progress, threads=threads)
-    observe([case], folder)
+    observe([case], folder, progress=False)
     return path
 
 
@@ -170,7 +171,7 @@ def run_study(
     if any(case.observed for case in cases):
         display.say("computes the quantities in [observe]")
         with client.as_current() if client is not None else nullcontext():
-            observe(cases, folder)
+            observe(cases, folder, progress=False)
     return outcomes
 
 
@@ -201,8 +202,9 @@ def run_cases(
     KeyboardInterrupt
         If interrupted; running cases finish their step first.
     """
-    if workers is not None and (client is not None or workers < 0):
-        raise InputError(key="workers", found=workers, expected="0 or more, and none together with a client")
+    count("threads", threads, 1)
+    if count("workers", workers, 0) is not None and client is not None:
+        raise InputError(key="workers", found=workers, expected="None together with a client")
     require_synchronous(client)
     distinct, folder = {case.key: case for case in cases}, folder.absolute()
     require_writable(folder, "for the results")

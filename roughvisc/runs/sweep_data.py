@@ -36,7 +36,7 @@ from roughvisc.runs.folder import (
     write_json,
 )
 from roughvisc.runs.netcdf import lazy, open_result, open_without_steps, read_variable
-from roughvisc.study.case import Case, identifier, labels_of, parameters_of
+from roughvisc.study.case import Case, cases_given, identifier, labels_of, parameters_of
 from roughvisc.study.sweep_table import DRAWN, REALISATION
 from roughvisc.variables import AXES, ROW, ROWS, VARIABLES, axis_of
 from roughvisc.version import program_version
@@ -284,16 +284,16 @@ def numbers_of(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, int]:
     return found
 
 
-def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.Dataset:
+def open_results(out: str | Path, *, cases: Sequence[Case] | str | Path | None = None) -> xr.Dataset:
     """Open all results of a sweep together; fields are read when they are needed.
 
     Parameters
     ----------
     out : path
         Folder of the results.
-    cases : sequence of Case, optional
-        Cases whose results to open, in this order. Default: the cases of the last sweep in this folder, or all results
-        if no sweep ran in it.
+    cases : sequence of Case, or path, optional
+        Cases whose results to open, in this order, or their study file. Default: the cases of the last sweep in this
+        folder, or all results if no sweep ran in it.
 
     Returns
     -------
@@ -340,7 +340,7 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.
     """
     folder = path_of(out, "out", "a folder of results").absolute()
     index = index_of(folder)
-    listed = read_sweep(folder) if cases is None else sweep_cases(cases, folder)
+    listed = read_sweep(folder) if cases is None else sweep_cases(cases_given(cases), folder)
     listed = listed or {key: entry.case for key, entry in index.items()}
     here = [place for place, key in enumerate(listed) if key in index]
     if not here:
