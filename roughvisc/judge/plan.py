@@ -502,9 +502,9 @@ def totals(dataset: xr.Dataset, folder: Path, workers: int | None, there: Availa
         "processes": processes,
         "threads": threads_each(processes),
         "wall_time": max(float(np.sum(seconds)) / processes, float(np.max(seconds))),
-        "memory": together,
+        "memory": round(together),
         "free_memory": there.size,
-        "disk": size,
+        "disk": round(size),
         "free_disk": free_disk,
         "refusal": "; ".join(reasons),
     }

@@ -33,7 +33,7 @@ from roughvisc.mechanics.materials.models import creep_series
 from roughvisc.mechanics.program import Program
 from roughvisc.paths import atomic_write, path_of
 from roughvisc.settings import Boundary, Edge, Missing, Numerics, Settings
-from roughvisc.study.case_text import study_text, value_text
+from roughvisc.study.case_text import case_html, study_text, value_text
 from roughvisc.study.identity import (
     area_of,
     body_identity,
@@ -215,6 +215,16 @@ class Case:
         parts = [f"{self.title!r}, {name} on {self.tables['material']['model']}", repr(self.experiment)]
         parts += [f"{key} = {value_text(key, value)}" for key, value in self.varied.items()]
         return f"Case {'; '.join(parts)}"
+
+    def _repr_html_(self) -> str:
+        """Return the case as a table, for a notebook."""
+        named = ("title", "surface", "material", "program", "friction")
+        others = {name: table for name, table in self.tables.items() if name not in named}
+        rows = {"surface": self.surface, "material": self.tables["material"], "experiment": repr(self.experiment)}
+        rows |= others | {"key": self.key}
+        if self.varied:
+            rows["varied"] = ", ".join(f"{key} = {value_text(key, value)}" for key, value in self.varied.items())
+        return case_html(f"Case {self.title!r}", rows)
 
     @property
     def surface(self) -> Mapping[str, Any]:

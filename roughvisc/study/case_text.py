@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import math
 import re
@@ -16,6 +17,8 @@ from roughvisc.units import unit_for
 
 #: Longest stem of a file name, and number of letters of a key that make it unique.
 _LONGEST, _KEY = 80, 8
+#: Largest number of values of a list that a table shows in full.
+_LISTED = 6
 
 
 def study_text(case: Mapping[str, Any]) -> str:
@@ -101,6 +104,37 @@ def case_words(case: Mapping[str, Any]) -> str:
     texts = varied_texts(case)
     words = ", ".join(f"{name[:1].lower()}{name[1:]} {texts[key]}" for key, name in names_of(list(texts)).items())
     return words[:1].upper() + words[1:]
+
+
+def case_html(title: str, rows: Mapping[str, Any]) -> str:
+    """Return a case as a table in HTML, for a notebook.
+
+    Parameters
+    ----------
+    title : str
+        Title of the case.
+    rows : mapping
+        Name of each row -> its text, or a table of the study in SI, whose values get suitable units.
+    """
+    lines = [f"<table><caption>{html.escape(title)}</caption>"]
+    for name, content in rows.items():
+        if isinstance(content, Mapping):
+            parts = [f"{key.replace('_', ' ')} {_texts(f'{name}.{key}', value)}" for key, value in content.items()]
+            content = "; ".join(parts)
+        left = "style='text-align:left'"
+        lines.append(f"<tr><th {left}>{html.escape(name)}</th><td {left}>{html.escape(content)}</td></tr>")
+    return "\n".join([*lines, "</table>"])
+
+
+def _texts(key: str, value: Any) -> str:
+    """Return a value or a list of values of a dotted key, in suitable units."""
+    if isinstance(value, list) and len(value) > _LISTED:
+        return f"{_texts(key, value[0])} to {_texts(key, value[-1])} ({len(value)} values)"
+    if isinstance(value, list):
+        return ", ".join(_texts(key, one) for one in value)
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name.replace('_', ' ')} {_texts(f'{key}.{name}', one)}" for name, one in value.items())
+    return value_text(key, value)
 
 
 def file_stems(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:

@@ -152,6 +152,15 @@ def test_adhesion__comes_back_from_the_study_file_and_counts_in_the_key(tmp_path
         assert rv.vary(weak, {"adhesion": none}).key == CASE.key != weak.key
 
 
+def test_html__shows_the_case_in_units():
+    times = np.arange(9.0)
+    material = rv.creep_table(times, 1e-6 * (1 + times), kind="shear")
+    case = rv.Case(WAVES, material, PRESS, title="<hold>", observe={"leakage": {"viscosity": "2 mPa s"}})
+    text = case._repr_html_()
+    for words in ("&lt;hold&gt;", "size 100 µm", "0 s to 8 s (9 values)", "hold 200 ms", "viscosity 2 mPa s", case.key):
+        assert words in text, words
+
+
 def test_vary__makes_the_product_and_pairs_and_names_objects():
     programs = {name: PROGRAMS[name] for name in ("ramp", "cycles")}
     cases = rv.vary(CASE, {"program": programs, "tolerance": ["1 %", 1e-3]})
