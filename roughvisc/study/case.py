@@ -296,7 +296,7 @@ class Case:
         stated = [
             surface_identity(self.surface, self.checksums),
             body_identity(self.body),
-            experiment_identity(self.experiment, area_of(self.surface)),
+            experiment_identity(self.experiment, area_of(self.surface, self.heights)),
             settings_identity(self.settings),
             NUMERICS_REVISION,
         ]

@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import fields, is_dataclass, replace
 from inspect import Parameter
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,11 +29,14 @@ from roughvisc.mechanics.materials.material import Creep, Prony
 from roughvisc.settings import Settings, attraction
 from roughvisc.study.study_file import in_si
 from roughvisc.topography.conditioning import FACE_STEPS, STEPS
-from roughvisc.topography.heights import digest_in
+from roughvisc.topography.heights import area_in, digest_in
 from roughvisc.topography.readers import sha256
 from roughvisc.topography.recipes import RECIPES, finest_wave, self_affine
 from roughvisc.topography.scans import is_card, measured_file, open_scan, read_card
 from roughvisc.units import number
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: Arguments of a surface that one number or a pair states.
 _PAIRS = ("size", "spacing", "shape")
@@ -192,10 +195,26 @@ def experiment_identity(experiment: Experiment, area: float | None) -> Any:
     return _plain(experiment)
 
 
-def area_of(surface: Mapping[str, Any]) -> float | None:
-    """Return the nominal area of a recipe; None for a scan and after steps that may change the area. [m2]"""
-    if "generate" not in surface or "second" in surface or any(surface.get(one, False) is not False for one in _RESIZE):
+def area_of(surface: Mapping[str, Any], heights: xr.DataArray | None = None) -> float | None:
+    """Return the nominal area of a recipe or of heights from Python; None for a scan, whose file is not read.
+
+    Parameters
+    ----------
+    surface : mapping
+        Table of the surface. After steps that may change the area it is None.
+    heights : xarray.DataArray, optional
+        Heights of the file that the surface names, which need not exist. [m]
+
+    Returns
+    -------
+    float or None
+        Area. [m2]
+    """
+    if "second" in surface or any(surface.get(name, False) is not False for name in _RESIZE):
         return None
+    if "generate" not in surface:
+        path = Path(surface["file"])
+        return area_in(path, heights) if digest_in(path.name) else None
     size = surface["size"]
     x, y = size if isinstance(size, list | tuple) else (size, size)
     return float(x) * float(y)

@@ -119,6 +119,16 @@ def test_key__of_a_scan_does_not_depend_on_its_card_or_the_name_of_a_unit(studie
     assert keys[0] == keys[1] == keys[2] != keys[3]
 
 
+def test_key__of_heights_is_equal_for_a_load_and_its_nominal_pressure(tmp_path):
+    area = SCAN.sizes["x"] * SCAN.sizes["y"] * 6e-6 * 7e-6
+    press = rv.Program().pressure(1e-5 / area, over="50 ms").hold("0.2 s")
+    pressed = rv.Case(SCAN, RUBBER, press, boundary="mirror", tolerance=1e-2, times=4)
+    assert pressed.key == HEIGHTS.key != rv.vary(HEIGHTS, {"program": PRESS.hold("1 s")}).key
+    assert rv.read_study(pressed.to_toml(tmp_path / "study.toml")).key == pressed.key
+    by_pressure = rv.run(pressed, tmp_path / "pressure", progress=False)
+    assert_equal(by_pressure, rv.run(HEIGHTS, tmp_path / "load", progress=False))
+
+
 PROGRAMS = {"ramp": PRESS, "cycles": PRESS.cycle("10 uN", "3 uN", "0.1 s", 3), "slide": PRESS.slide("20 um", over=1)}
 
 
