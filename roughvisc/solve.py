@@ -93,7 +93,8 @@ class Recorder:
 
     def restart(self) -> None:
         """Delete all rows, because the solve starts again."""
-        self.plain, self._arrays = [], []
+        self.plain = []
+        self._arrays = []
 
 
 def solve(
@@ -139,7 +140,8 @@ def solve(
         is_alone = threading.current_thread() is threading.main_thread() and multiprocessing.parent_process() is None
         threads = CPU_COUNT if threads == 1 and is_alone else threads
     problem = experiment.resolved(problem)
-    height, settings = problem.height, problem.settings
+    height = problem.height
+    settings = problem.settings
     # a curve of steady sliding does so itself
     loading = experiment if settings.grid_error and isinstance(experiment, Loading) else None
     compared = ("pressure", "gap") if attraction(settings) is not None else ("pressure",)
@@ -174,8 +176,10 @@ def solve_on_grid(
     problem: Problem, experiment: Experiment, recorder: Recorder, report: Progress | None = None
 ) -> xr.Dataset:
     """Solve on the given grid, without the runs on coarser grids and without labels."""
-    began, reached = time.perf_counter(), recorder.latest
-    state, spent = reached.state, reached.wall_time
+    began = time.perf_counter()
+    reached = recorder.latest
+    state = reached.state
+    spent = reached.wall_time
     while True:
         rows = experiment.rows(problem, state, in_memory=recorder.in_memory)
         if reached.state is not None:
@@ -190,7 +194,8 @@ def solve_on_grid(
         except Outgrown as outgrown:
             log.info("contact has outgrown its domain: the run begins again on a larger one")
             recorder.restart()
-            reached, state = recorder.latest, outgrown.args[0]
+            reached = recorder.latest
+            state = outgrown.args[0]
 
 
 def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dataset:
@@ -210,7 +215,9 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     xarray.Dataset
         Over the axis of the experiment, not labelled yet.
     """
-    height, settings, axis = rows.problem.height, rows.problem.settings, experiment.axis
+    height = rows.problem.height
+    settings = rows.problem.settings
+    axis = experiment.axis
     steps = recorder.plain
     kept = list(filter(itemgetter("kept"), steps))
     numbers = np.flatnonzero(list(map(itemgetter("kept"), steps))).tolist()
@@ -241,7 +248,8 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     } | experiment.facts(rows.problem.body, height)
     dataset, warnings = rows.finish(xr.Dataset(variables, coordinates, made))
 
-    tables, lines = list[str](), list[str]()
+    tables = list[str]()
+    lines = list[str]()
     for material in rows.problem.body.materials:
         if material.warning and material.warning not in tables:
             tables.append(material.warning)

@@ -170,7 +170,8 @@ def read_table(path: str | Path, wanted: Mapping[str, Wanted]) -> tuple[dict[str
     headings = (at for at, (_, cells) in enumerate(rows[:_FIRST]) if all(_places(cells, name) for name in needed))
     if (above := next(headings, None)) is None:
         raise _no_heading(path, rows, separator, wanted)
-    (line, heading), below = rows[above], rows[above + 1 :]
+    line, heading = rows[above]
+    below = rows[above + 1 :]
     if not below:
         raise InputError(f"{path}: holds no rows below the heading in line {line}: expected {', '.join(wanted)}")
     places = {key: found for key, one in wanted.items() if (found := _places(heading, one.name))}
@@ -190,7 +191,8 @@ def read_table(path: str | Path, wanted: Mapping[str, Wanted]) -> tuple[dict[str
         values = [float(plain_number(cell, mark) or "nan") for cell in column]
         for (row, _), cell, value in zip(below, column, values, strict=True):
             if not math.isfinite(value):
-                where, expected = f"{path}, line {row}", f"a number for {key}"
+                where = f"{path}, line {row}"
+                expected = f"a number for {key}"
                 raise InputError(f"{where}: found {cell!r}: expected {expected}", found=cell, expected=expected)
         columns[key] = np.array(list(map(converted[key], values)))
     return columns, [row for row, _ in below]
@@ -301,7 +303,8 @@ def _conversion(path: Path, line: int, names: Sequence[str], key: str, one: Want
         raise InputError(f"{where}: unit of {key}: {problem}: expected one unit")
     unit = given or stated
     if not unit:
-        found, expected = names[0], _example(names[0], one.unit)
+        found = names[0]
+        expected = _example(names[0], one.unit)
         message = f"{where}: found the column {found!r} without a unit: expected a heading, {expected!r}"
         raise InputError(message, found=found, expected=expected)
     try:
@@ -361,7 +364,8 @@ _KINDS_OF_UNITS = ("1", "s", "1/s", "Pa", "1/Pa", "Pa s", "K", "m", "N")
 #: A cell that looks like a number, but not like a unit such as ``1/MPa``.
 _LIKE_A_NUMBER = re.compile(r"[+-]?[.,]?\d[^A-DF-Za-df-zµ°%/]*")
 #: Largest number of rows of units below the names, and of lines that a note lists.
-_UNIT_ROWS, _LISTED = 2, 6
+_UNIT_ROWS = 2
+_LISTED = 6
 
 
 def read_export(path: str | Path, wanted: Mapping[str, Wanted], part: str | None = None) -> Export:
@@ -417,7 +421,8 @@ def read_export(path: str | Path, wanted: Mapping[str, Wanted], part: str | None
         for line, row in zip(table.lines, table.rows, strict=True):
             value = float(plain_number(row[number_of_column], mark) or "nan")
             if not math.isfinite(value):
-                where, expected = f"{path}, line {line}", f"a number for {key}"
+                where = f"{path}, line {line}"
+                expected = f"a number for {key}"
                 cell = row[number_of_column]
                 raise InputError(f"{where}: found {cell!r}: expected {expected}", found=cell, expected=expected)
             values.append(convert(value))
@@ -497,7 +502,10 @@ class _ExportTable:
     """Rows of numbers below the names of an export, and rows of units."""
 
     def __init__(self, path: Path, separator: str, heading: list[str], places: dict[str, int]) -> None:
-        self.path, self.separator, self.heading, self.places = path, separator, heading, places
+        self.path = path
+        self.separator = separator
+        self.heading = heading
+        self.places = places
         self.rows: list[list[str]] = []
         self.lines: list[int] = []
         self.left_out: list[int] = []
@@ -505,7 +513,8 @@ class _ExportTable:
 
     def read(self, lines: list[tuple[int, str]], *, has_part: bool) -> None:
         """Read the rows; with a part up to the end of this step, without one refuse the rows of another step."""
-        since_names, interrupted = 0, 0
+        since_names = 0
+        interrupted = 0
         for line, text in lines:
             if text.startswith("#"):
                 continue
@@ -532,7 +541,8 @@ class _ExportTable:
                         raise InputError(f"{where}: found {cell!r}: expected {expected}", found=cell, expected=expected)
                 self.left_out.append(line)
             elif row == self.heading:
-                since_names, interrupted = 0, 0
+                since_names = 0
+                interrupted = 0
                 self.left_out.append(line)
             elif since_names <= _UNIT_ROWS and len(row) > max(self.places.values()):
                 for key, cell in zip(self.places, wanted, strict=True):

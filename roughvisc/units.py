@@ -105,7 +105,8 @@ def number(
     """
     if getattr(value, "shape", None) == ():
         value = value.item()
-    found, problem = math.nan, ""
+    found = math.nan
+    problem = ""
     if isinstance(value, str):
         try:
             found = _parsed(value, unit, difference)
@@ -246,7 +247,8 @@ def quantities(**units: str) -> Callable[[_Taking], _Taking]:
                 names = ", ".join(name for name in taking.parameters if name != "self")
                 raise TypeError(f"{owner}(): {problem}: expected {names}") from None
             for name in filter(bound.arguments.__contains__, declared):
-                (unit, limit), value = declared[name], bound.arguments[name]
+                unit, limit = declared[name]
+                value = bound.arguments[name]
                 if name in lists:
                     numbers = listed(value, unit, name).tolist()
                     bound.arguments[name] = tuple(numbers) if isinstance(value, tuple) else numbers
@@ -278,7 +280,8 @@ def _parsed(text: str, unit: str, difference: bool) -> float:
     matched = _QUANTITY.fullmatch(text.replace("°C", "degC").replace("°F", "degF")) if len(text) <= 100 else None
     if matched is None:
         raise ValueError("not a quantity")
-    value, found = float(matched[1]), matched[2]
+    value = float(matched[1])
+    found = matched[2]
     dimensionless = unit in ("", "1")
     if found is None:
         if dimensionless:
@@ -292,7 +295,8 @@ def _parsed(text: str, unit: str, difference: bool) -> float:
     try:
         known = "percent" if found == "%" else _written_powers(found.replace("·", "*"))
         names = registry.parse_units_as_container(f"1{known}" if known.startswith("/") else known)
-        given, expected = registry.Unit(names), registry.Unit("" if dimensionless else unit)
+        given = registry.Unit(names)
+        expected = registry.Unit("" if dimensionless else unit)
         if given.dimensionality != expected.dimensionality or (dimensionless and not _ANGLES.isdisjoint(names)):
             raise ValueError(f"in {given}")
         converted, begins = (float(registry.Quantity(one, given).to(expected).magnitude) for one in (value, 0.0))
@@ -315,7 +319,9 @@ def _prefixed(number: str, found: str, unit: str) -> float | None:
     Most quantities of a study are of this form, and the registry of pint takes 0.2 s to build. A number of at most 15
     digits equals the one of pint rounded to 15 digits.
     """
-    expected, factors, power = unit.split(" "), found.split(" "), 0
+    expected = unit.split(" ")
+    factors = found.split(" ")
+    power = 0
     if len(expected) != len(factors) or not _WITH_PREFIX.issuperset(expected) or len(number) > 15:
         return None
     for name, wanted in zip(factors, expected, strict=True):

@@ -22,7 +22,8 @@ RESULT_FORMAT = 1
 STATUS_MEANINGS = ("converged", "open", "full_contact", "jump")
 
 #: Dimension of the kept times or speeds of cases that do not share them, and number of these in each case.
-ROW, ROWS = "row", "rows"
+ROW = "row"
+ROWS = "rows"
 #: Dimension of all accepted steps.
 STEP = "step"
 #: Dimensions that a result of one case may have in addition to the dimension of its rows.

@@ -102,7 +102,8 @@ def run(
         cases = [rv.vary(case, {"solve.device": device}).with_fields(varied=case.varied) for case in cases]
     if targets and len(cases) > 1:
         raise InputError(key="for", found=targets[0], expected=f"one case, and {study} has {len(cases)}")
-    folder, console = result_folder(cases[0], out), screen(quiet)
+    folder = result_folder(cases[0], out)
+    console = screen(quiet)
     remote = [settings.pop(name) for name in ("scheduler", "scheduler_file")]
     with connect(*remote) if any(remote) else nullcontext() as client:
         if targets:
@@ -222,7 +223,8 @@ def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, 
     from roughvisc.runs.sweep_data import numbers_of, sweep_cases
 
     found = run_study(cases, folder, client=client, display=Display(not console.quiet, console), **computing)
-    outcomes, numbers = list(found.values()), numbers_of(sweep_cases(cases))
+    outcomes = list(found.values())
+    numbers = numbers_of(sweep_cases(cases))
     console.print(sweep_table(outcomes, len(cases), cases[0].title))
     for what, path in (("Results", folder), ("Table of cases", folder / CASES), ("Log", folder / LOG)):
         say_path(console, what, path)
@@ -259,7 +261,8 @@ def trade(study: Path, out: Path | None, accuracy: str, quantity: str | None, qu
     from roughvisc.units import number
 
     part = number(accuracy, "1", "accuracy", above=0, below=1)
-    case, console = rv.read_study(study), screen(quiet)
+    case = rv.read_study(study)
+    console = screen(quiet)
     folder = out or result_folder(case) / FOLDER
     dataset = rv.trade(case, quantity=quantity or (), out=folder, progress=not quiet)
     console.print(trade_table(dataset, str(dataset["quantity"].values[0]), part))

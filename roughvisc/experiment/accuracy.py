@@ -33,7 +33,8 @@ from roughvisc.variables import VARIABLES
 Array = NDArray[np.float64]
 #: Errors inherited from the contact solver in earlier steps, over its largest error so far: of the pressure, and of the
 #: approach.
-INHERITED, INHERITED_APPROACH = 0.25, 0.06
+INHERITED = 0.25
+INHERITED_APPROACH = 0.06
 #: Least stated error of the pressure of an elastic body, over the tolerance. Measured on the same rows.
 LEAST = 0.015
 #: Error of the work of an elastic body due to the contact solver, over its error of the pressure times the largest
@@ -85,7 +86,8 @@ def shortest_age(program: Program, settings: Settings) -> float:
     tenth of the tolerance this equals the error allowed at longer ages. No step is shorter than a millionth of a
     segment, so a smaller ``f`` is not needed.
     """
-    shortest, kept = math.inf, kept_times(program, settings.times)
+    shortest = math.inf
+    kept = kept_times(program, settings.times)
     for segment in program.segments:
         if segment.duration > 0:
             shortest = min(shortest, segment.duration, segment.period)
@@ -94,9 +96,11 @@ def shortest_age(program: Program, settings: Settings) -> float:
     elif kept is None:
         shortest *= SHORTEST_PAIR
     else:
-        corners, times = np.array(program.corners), np.array(kept)
+        corners = np.array(program.corners)
+        times = np.array(kept)
         after = np.searchsorted(times, corners, side="right")
-        corners, after = corners[after < times.size], after[after < times.size]
+        corners = corners[after < times.size]
+        after = after[after < times.size]
         shortest = min(shortest, float(np.min(times[after] - corners, initial=math.inf)))
         shortest *= max(SERIES_SHARE * settings.tolerance, SHORTEST_PAIR)
     return shortest
@@ -143,10 +147,14 @@ def error_columns(step: Step, scene: Scene) -> dict[str, float]:
     values of the kept rows so far and of the step. Errors of the series and of the work are relative to the largest
     values of all steps: values left after unloading are differences of large values. Errors of the work add up.
     """
-    point, state, error = step.point, step.state, step.difference
+    point = step.point
+    state = step.state
+    error = step.difference
     control = scene.program.segments[step.segment].control
-    given, remembers = scene.program.prescribes[step.segment], not scene.memory.is_elastic
-    largest_force, largest_approach = max(state.kept_force, point.size), max(state.kept_approach, abs(point.approach))
+    given = scene.program.prescribes[step.segment]
+    remembers = not scene.memory.is_elastic
+    largest_force = max(state.kept_force, point.size)
+    largest_approach = max(state.kept_approach, abs(point.approach))
     series_error = scene.memory.series_error  # from the shortest known age on
     loaded = max(state.largest_force, point.size, 1e-300)
     reached = max(state.largest_approach, abs(point.approach), 1e-300)
@@ -171,7 +179,8 @@ def error_columns(step: Step, scene: Scene) -> dict[str, float]:
         approach += INHERITED_APPROACH * state.solver_error * reached if remembers else 0.0
     stepped = error.pressure + error.shared
     pressure = (stepped + solved * point.size + of_force) / largest_force if largest_force > 0 else solved
-    per_force, per_approach = largest_force or math.inf, largest_approach or math.inf
+    per_force = largest_force or math.inf
+    per_approach = largest_approach or math.inf
     return {
         "time_error": max(stepped / per_force, error.force / per_force, error.approach / per_approach),
         "stated_error": max(pressure, force / per_force, approach / per_approach),
@@ -383,13 +392,16 @@ def wakes_of(scene: Scene, profile: Profile, pressure: Array | None) -> str:
     pressure : ndarray, shape (nx, ny), or None
         Pressure at the last kept time, if kept. [Pa]
     """
-    wakes, end = [], scene.program.duration
+    wakes = []
+    end = scene.program.duration
     for axis in (0, 1):
         period = profile.height.shape[axis] * profile.spacing[axis]
-        path, left = 0.0, dict[float, float]()
+        path = 0.0
+        left = dict[float, float]()
         for segment in scene.program.segments:
             if segment.slide is not None and segment.slide.axis == axis:
-                path, speed = path + segment.slide.distance, segment.slide.distance / segment.duration
+                path = path + segment.slide.distance
+                speed = segment.slide.distance / segment.duration
                 crept = scene.memory.compliance(min(period / speed, end))
                 left[speed] = 1.0 - crept / scene.memory.compliance(end)
         # on a shorter path the contact does not reach the wake of its neighbour

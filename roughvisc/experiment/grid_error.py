@@ -51,7 +51,8 @@ _ONE_COARSER_USUAL = 3.0, 1.5
 #: The area of a sliding contact converges more slowly than the area of a contact at rest.
 _MOVING = {"contact_area": (1.0, 1.0)}
 #: Roache's safety factors: with three grids, and with two.
-_THREE, TWO_GRIDS = 1.25, 3.0
+_THREE = 1.25
+TWO_GRIDS = 3.0
 
 
 def grid_uncertainty(name: str, near: ArrayLike, far: ArrayLike, ratio: float, *, moving: bool = False) -> Array:
@@ -81,7 +82,8 @@ def grid_uncertainty(name: str, near: ArrayLike, far: ArrayLike, ratio: float, *
     ----------
     .. [1] P. J. Roache, Annu. Rev. Fluid Mech. 29 (1997) 123.
     """
-    near, far = np.asarray(near, dtype=float), np.asarray(far, dtype=float)
+    near = np.asarray(near, dtype=float)
+    far = np.asarray(far, dtype=float)
     usual = ORDERS.get(name, _USUAL)
     lowest, expected = _MOVING.get(name, usual) if moving else usual
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -97,7 +99,8 @@ Mask = NDArray[np.bool_]
 #: Largest error of the pressure (L1) per unit force on cells at the edge of the contact. The first is for edges on the
 #: material (measured 0.2 in the median, 0.5 in 5 % of the cases), the second for edges of the material, where the
 #: pressure is infinite. If the edge carries all of the force, the pressure is unknown.
-_AT_EDGE, _AT_END = 0.45, 0.9
+_AT_EDGE = 0.45
+_AT_END = 0.9
 #: Error of the number of contact cells over the square root of the number of faces at the edge of the contact, since
 #: the edge lies at random between the cells. Each mirror symmetry of the contact doubles the same error.
 _COUNTING = 0.5
@@ -249,7 +252,8 @@ def _least_errors(
     """
     here = {name: float(dataset[name][row]) for name in ("force", "approach", "contact_area", "contact_area_counted")}
     wide = largest["mean_gap"]
-    force, area = here["force"] / largest["force"], here["contact_area"] / largest["contact_area"]
+    force = here["force"] / largest["force"]
+    area = here["contact_area"] / largest["contact_area"]
 
     # The peak: under a given approach the gap is too wide by its height. Force and area grow with the square of the
     # approach under a cone, and with lower powers under a ball. Under a given load the approach is too small.
@@ -258,10 +262,13 @@ def _least_errors(
     least = {"pressure": part * force, "force": part * force, "contact_area": part * area}
     least |= {"approach": 0.0 if given else peak / largest["approach"], "mean_gap": peak / wide if given else 0.0}
 
-    pressure, height = dataset["pressure"].values[row], dataset["height"].values
-    contact, present = pressure > 0, np.isfinite(height)
+    pressure = dataset["pressure"].values[row]
+    height = dataset["height"].values
+    contact = pressure > 0
+    present = np.isfinite(height)
     if "adhesive_force" in dataset:
-        contact, pressure = dataset["gap"].values[row] == 0, np.abs(pressure)
+        contact = dataset["gap"].values[row] == 0
+        pressure = np.abs(pressure)
     if not contact.any():
         return least
     # Full contact on this grid may hide small openings.
@@ -334,8 +341,11 @@ def _edge(contact: Mask, present: Mask, boundary: Boundary) -> tuple[Mask, Mask,
     The faces are those to free cells, those at the edge of the material, and those of the last to absent cells. The
     others lie at the border of the grid, whose place is known.
     """
-    at_edge, at_end = np.zeros_like(contact), np.zeros_like(contact)
-    faces, ends, outline = 0, 0, 0
+    at_edge = np.zeros_like(contact)
+    at_end = np.zeros_like(contact)
+    faces = 0
+    ends = 0
+    outline = 0
     around = (neighbours(mask, boundary) for mask in (present & ~contact, present, ~present))
     for free, material, absent in zip(*around, strict=True):
         at_edge |= contact & free

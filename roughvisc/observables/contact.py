@@ -153,7 +153,8 @@ def distribution(
     """
     one_of("name", name, ("pressure", "gap"))
     need(dataset, name)
-    field, dim = by_frame(dataset[name]), f"{name}_bin"
+    field = by_frame(dataset[name])
+    dim = f"{name}_bin"
     if isinstance(bins, int | np.integer):
         largest = float(field.max())
         edges = np.linspace(0.0, largest if largest > 0 else 1.0, int(bins) + 1)
@@ -244,7 +245,8 @@ def leakage(
     one_of("along", along, ("x", "y"))
     need(dataset, "gap")
     wrap = boundary_of(dataset) == "periodic"
-    gap, cells = dataset["gap"], dict(zip("xy", spacing(dataset, "leakage"), strict=True))
+    gap = dataset["gap"]
+    cells = dict(zip("xy", spacing(dataset, "leakage"), strict=True))
     across = "y" if along == "x" else "x"
     sides_of_cell = cells[along], cells[across]
 
@@ -319,7 +321,8 @@ def closure(dataset: xr.Dataset, *, along: Literal["x", "y"] = "x") -> xr.Datase
     """
     need(dataset, "gap", "height", "mean_gap", "force")
     aperture = leakage(dataset, along=along)["hydraulic_aperture"]
-    height, mean_gap = dataset["height"], dataset["mean_gap"]
+    height = dataset["height"]
+    mean_gap = dataset["mean_gap"]
     highest = height.attrs.get("highest", height.max(("x", "y")))
     closed = (highest - height.mean(("x", "y"))) - mean_gap
     pressure = dataset["force"] / (math.prod(spacing(dataset, "closure")) * height.sizes["x"] * height.sizes["y"])
@@ -416,7 +419,8 @@ def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str]) -> xr.D
         return frozen_contact(touching, cells, boundary, present=present)
 
     stiffness, error = frame_by_frame(measure, touching, present, outputs=[(), ()])
-    name, factor = f"{kind}_conductance", 2 / sum(both)
+    name = f"{kind}_conductance"
+    factor = 2 / sum(both)
     described = label(xr.Dataset({name: factor * stiffness, f"{name}_error": factor * error}))
     described[name].attrs["resistivity"] = both
     return described

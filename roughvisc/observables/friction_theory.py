@@ -175,7 +175,8 @@ def _speeds(speeds: Any) -> list[float]:
 
 def _decades(q: Array) -> Array:
     """Return the wave numbers at the borders of the decades of wavelength, powers of ten, and at both ends. [rad/m]"""
-    low, high = math.log10(q[0] / (2 * math.pi)), math.log10(q[-1] / (2 * math.pi))
+    low = math.log10(q[0] / (2 * math.pi))
+    high = math.log10(q[-1] / (2 * math.pi))
     inner = np.arange(math.floor(low) + 1, math.ceil(high))
     inner = inner[(inner > low + _REST) & (inner < high - _REST)]
     return np.concatenate([q[:1], 2 * math.pi * 10.0**inner, q[-1:]])

@@ -223,7 +223,8 @@ def friction_of_waves(sliding: Sliding, height: Array, pressure: float) -> tuple
     stress, drag = ((power * part).ravel()[order] for part in (np.abs(stiffness) ** 2, -sliding.qx * stiffness.imag))
     sorted_length = length.ravel()[order]
     first = np.flatnonzero(np.diff(sorted_length, prepend=-1.0) > _SAME * sorted_length)
-    own, drag = np.add.reduceat(stress, first), np.add.reduceat(drag, first)
+    own = np.add.reduceat(stress, first)
+    drag = np.add.reduceat(drag, first)
     variance = np.cumsum(own) - own / 2
     with np.errstate(divide="ignore"):
         contact = erf(pressure / np.sqrt(2 * variance))

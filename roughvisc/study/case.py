@@ -248,7 +248,8 @@ class Case:
     @property
     def shift_factor(self) -> float:
         """Factor of all times of the material at its temperature. [-]"""
-        factor, law = shift_factor(self.tables["material"]), self.material.thermal
+        factor = shift_factor(self.tables["material"])
+        law = self.material.thermal
         is_measured = "temperatures" in self.tables["material"] and isinstance(law, ThermalLaw)
         return factor * law.shift(law.temperature) if is_measured else factor
 
@@ -314,7 +315,8 @@ class Case:
         """
         from roughvisc.experiment.memory_limit import require_surface  # slow to import
 
-        before, source = self.checksums, str(self.origin or "case")
+        before = self.checksums
+        source = str(self.origin or "case")
         try:
             if "shape" in self.surface:
                 require_surface(self.surface["shape"])
@@ -359,7 +361,8 @@ class Case:
             raise InputError(f"not a case written by to_json: {error}") from error
         if folder:
             data = _with_paths(data, lambda path: os.path.normpath(folder.absolute() / path))
-        origin, varied = data.pop("origin", None), data.pop("varied", {})
+        origin = data.pop("origin", None)
+        varied = data.pop("varied", {})
         return _case_of(data, origin and Path(origin)).with_fields(varied=varied)
 
     def stored(self, folder: Path) -> Case:
@@ -460,7 +463,8 @@ def read_study(path: str | Path) -> Case:
     """
     cases = read_cases(path)
     if len(cases) > 1 or cases[0].varied:
-        found, expected = f"{len(cases)} cases", "one; read_cases() reads them all"
+        found = f"{len(cases)} cases"
+        expected = "one; read_cases() reads them all"
         raise InputError(key="sweep", found=found, expected=expected).prefixed(str(path))
     return cases[0]
 
@@ -661,7 +665,8 @@ def changed(
     leaves_out : bool
         Whether to leave out times after the end of a changed program, instead of refusing them.
     """
-    heights, function = case.heights, case.function
+    heights = case.heights
+    function = case.function
     placed: dict[str, Any] = {}
     written: dict[str, str] = {}
     refuse_unknown("", {key: value for key, value in changes.items() if "." not in key}, (*TABLES, *TABLE_OF))
@@ -767,7 +772,9 @@ def _case_of(
         data = place(data, key, value)
     named, surface = split(a_table("surface", data.get("surface", {})), "file")
     if heights is None or digest_in(named.get("file", "")) != digest_in(file_name(heights)):
-        named, surface, heights = {}, data.get("surface"), None
+        named = {}
+        surface = data.get("surface")
+        heights = None
     try:
         tables = with_files({**data, "surface": surface} if heights is not None else data, folder)
         tables["surface"] |= named

@@ -16,7 +16,8 @@ from roughvisc.topography.scans import toml_text
 from roughvisc.units import unit_for
 
 #: Longest stem of a file name, and number of letters of a key that make it unique.
-_LONGEST, _KEY = 80, 8
+_LONGEST = 80
+_KEY = 8
 #: Largest number of values of a list that a table shows in full.
 _LISTED = 6
 
@@ -39,7 +40,8 @@ def study_text(case: Mapping[str, Any]) -> str:
     shear_modulus = 1000000.0
     <BLANKLINE>
     """
-    text, tables = "", ""
+    text = ""
+    tables = ""
     for name, value in case.items():
         if name in ("origin", "varied"):
             continue
@@ -154,7 +156,8 @@ def file_stems(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     """
     stems = {}
     for key, case in cases.items():
-        texts, parts = varied_texts(case), []
+        texts = varied_texts(case)
+        parts = []
         names = names_of(list(texts))
         for dotted, text in texts.items():
             value = PurePath(text).stem if dotted.rpartition(".")[2] == "file" else text

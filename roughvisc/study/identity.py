@@ -97,7 +97,9 @@ def _face(face: Mapping[str, Any], checksum: str, steps: Sequence[str] | Mapping
     """Return the source of a face and the steps of its card and its own, in the order in which they are applied."""
     if "file" not in face:
         return _with_steps([_recipe(face)], _steps(face, steps))
-    path, card, stages = Path(face["file"]), dict[str, Any](), list[dict[str, Any]]()
+    path = Path(face["file"])
+    card = dict[str, Any]()
+    stages = list[dict[str, Any]]()
     if is_card(path):
         card = in_si(read_card(path)[1], "surface", {})
         stages.append(_steps(card, STEPS))
@@ -128,7 +130,8 @@ def _steps(face: Mapping[str, Any], names: Sequence[str] | Mapping[str, Any]) ->
     """Return all arguments of each step that is applied."""
     found = {}
     for name in names:
-        value, step = face.get(name, False), STEPS[name]
+        value = face.get(name, False)
+        step = STEPS[name]
         if value is not False:
             table = value if isinstance(value, Mapping) else {} if value is True else {step.argument: value}
             found[name] = _stated(step.function, table, 1)

@@ -100,7 +100,8 @@ def read_history(
     unit = UNITS[control]
     is_part = isinstance(thin, str) and is_quantity(thin, "1")
     limit = number(thin, "1" if is_part else unit, "thin", least=0)
-    offset, scale = number(zero, unit, "zero"), number(factor, "1", "factor")
+    offset = number(zero, unit, "zero")
+    scale = number(factor, "1", "factor")
     found, lines = read_table(path, {"time": Wanted(time, "s"), control: Wanted(column, unit)})
     measured = found["time"]
     start = float(measured[0])
@@ -110,9 +111,11 @@ def read_history(
     for at in np.flatnonzero(measured[2:] == measured[:-2])[:1]:
         told = f"lines {lines[at]} to {lines[at + 2]}: three rows at {measured[at]:g} s"
         raise InputError(f"{path}, {told}: expected at most two, which are a jump; export more digits")
-    times, values = _less(measured, start), _less(found[control], offset) * scale
+    times = _less(measured, start)
+    values = _less(found[control], offset) * scale
     notes = [f"{start:g} s in the file is time zero"] if start else []
-    largest, lowest = float(np.max(np.abs(values))), float(values.min())
+    largest = float(np.max(np.abs(values)))
+    lowest = float(values.min())
     if control in LEAST and lowest < 0:
         highest = max(float(values.max()), 0.0)
         if lowest < -_NOISE * highest:
@@ -169,17 +172,23 @@ def thinned(times: Array, values: Array, tolerance: float) -> NDArray[np.intp]:
     """
     if tolerance <= 0:
         return np.arange(len(times))
-    at, of, kept = times.tolist(), values.tolist(), [0]
+    at = times.tolist()
+    of = values.tolist()
+    kept = [0]
     while kept[-1] < len(at) - 1:
         start = kept[-1]
-        low, high, farthest = -math.inf, math.inf, start + 1
+        low = -math.inf
+        high = math.inf
+        farthest = start + 1
         for row in range(start + 1, len(at)):
             if at[row] == at[row - 1]:  # a jump: the line ends before it
                 break
-            span, rise = at[row] - at[start], of[row] - of[start]
+            span = at[row] - at[start]
+            rise = of[row] - of[start]
             if low <= rise / span <= high:
                 farthest = row
-            low, high = max(low, (rise - tolerance) / span), min(high, (rise + tolerance) / span)
+            low = max(low, (rise - tolerance) / span)
+            high = min(high, (rise + tolerance) / span)
             if low > high:
                 break
         kept.append(farthest)

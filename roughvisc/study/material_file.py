@@ -28,7 +28,8 @@ COLUMNS: dict[str, dict[str, tuple[str, str]]] = {
 for _columns in COLUMNS.values():
     _columns["temperature"] = ("temperatures", "K")
 #: Columns that are read only if their name is stated, and those that are read if the file has them.
-_IF_STATED, _IF_THERE = ("temperature", "tan_delta"), ("shift_factor",)
+_IF_STATED = ("temperature", "tan_delta")
+_IF_THERE = ("shift_factor",)
 #: Keys of a table that describe its file.
 FILE = ("file", "columns", "part")
 

@@ -40,11 +40,14 @@ _EXPORTS: tuple[tuple[re.Pattern[str], dict[str, str]], ...] = (
 )
 #: Part of the largest force or depth from which on a row is at the end of the approach, part of the largest force at
 #: which depths begin, and shortest hold over the approach.
-_REACHED, _TOUCHED, _HELD = 0.98, 0.05, 0.1
+_REACHED = 0.98
+_TOUCHED = 0.05
+_HELD = 0.1
 #: Smallest fall of the depth, over its largest value, that begins the retraction.
 _FALL = 0.005
 #: Largest number of rows of a fit; more are averaged. Smallest number of rows in contact.
-_MOST_ROWS, _LEAST_ROWS = 600, 20
+_MOST_ROWS = 600
+_LEAST_ROWS = 20
 #: Largest half-width of an interval of 90 %, over the modulus: beyond it the modulus is not determined.
 _WIDEST = 0.5
 #: Largest noise of the depth, over its rise: with 3e-4 and 1e-3, intervals of 90 % cover 86 and 20 %.
@@ -319,7 +322,8 @@ def fit_material(
         expected = "a record that determines the modulus to half of itself: less noise, or a longer hold"
         raise InputError(key="record", found="wider intervals at all times", expected=expected)
     times = rows.terms() if terms is None else listed(terms, "s", "terms")
-    shortest, longest = known.time[is_known][0], 3 * known.time[is_known][-1]
+    shortest = known.time[is_known][0]
+    longest = 3 * known.time[is_known][-1]
     for i, one in enumerate(() if terms is None else times):
         if not shortest <= one <= longest:
             expected = f"a relaxation time that the record determines, from {shortest:.3g} to {longest:.3g} s"
@@ -392,7 +396,8 @@ def _rows(record: xr.Dataset, factor: float, exponent: float) -> tuple[Indentati
 def _found_contact(rows: Indentation) -> float:
     """Return the contact point; refuse a record that does not show it."""
     above = int(np.argmax(rows.force > _SEARCHED * rows.force.max()))
-    low, high = float(rows.depth.min()), float(rows.depth[above])
+    low = float(rows.depth.min())
+    high = float(rows.depth[above])
     contact = contact_point(rows, low, high) if high > low else low
     if contact <= low + 1e-3 * (high - low):
         expected = "a record that begins before the contact, with an offset of the force subtracted, or contact_point"

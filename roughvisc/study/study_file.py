@@ -410,7 +410,8 @@ def check_loads(where: str, stated: Any, program: Program, can_pull: bool) -> No
         return
     if isinstance(stated, list):
         row = next(row for row, value in enumerate(stated) if value < 0)
-        where, stated = f"{where}.{row}", stated[row]
+        where = f"{where}.{row}"
+        stated = stated[row]
     raise InputError(key=where, found=stated, expected="a load or pressure of at least 0, or a table [adhesion]")
 
 
@@ -437,7 +438,8 @@ def settings_of(tables: Mapping[str, Any], experiment: Experiment, body: Body) -
         raise InputError(key="solve.boundary", found="auto", expected=OPEN_BOUNDARY)
     settings = replace(settings, boundary=boundary)
     if isinstance(experiment, Loading) and isinstance(settings.times, tuple):
-        end, last = experiment.program.duration, max(settings.times, default=0.0)
+        end = experiment.program.duration
+        last = max(settings.times, default=0.0)
         if last > end * (1 + _ROUNDING):
             raise InputError(key="keep.times", found=last, expected=f"times up to the end of the program, {end:g} s")
     for name, value, expected in experiment.unsupported(settings, body):

@@ -21,13 +21,15 @@ from roughvisc.errors import InputError, short_repr
 Array = NDArray[np.float64]
 
 #: Keys of the number of realisations in a sweep, and of the number of a realisation in a case.
-REALISATIONS, REALISATION = "realisations", "realisation"
+REALISATIONS = "realisations"
+REALISATION = "realisation"
 #: Number of the measured surface, which comes before its surrogates.
 ITSELF = 0
 #: Keys that a realisation changes.
 SURROGATE, _SEED = DRAWN = ("surface.realisation", "surface.seed")
 #: Largest numbers of realisations and of cases.
-MOST, MOST_CASES = 10_000, 100_000
+MOST = 10_000
+MOST_CASES = 100_000
 
 
 def sweep_changes(sweep: Any, data: Mapping[str, Any], folder: Path) -> list[tuple[dict[str, Any], dict[str, int]]]:
@@ -153,7 +155,8 @@ def _realisations(
     if "file" in surface or "file" in a_table("surface.second", surface.get("second", {})):
         surrogates = [{SURROGATE: number} for number in range(ITSELF + 1, count + 1)]
         return [(change | one, {REALISATION: number}) for number, one in enumerate([{}, *surrogates], ITSELF)]
-    made, seed = surface.get("generate"), surface.get("seed")
+    made = surface.get("generate")
+    seed = surface.get("seed")
     if made not in ("self_affine", "spectrum") or "second" in surface:
         expected = "a scan, or one face of 'self_affine' or 'spectrum'"
         raise InputError(key=where, found=f"generate = {made!r}", expected=expected)
@@ -198,7 +201,8 @@ def place(tables: Any, key: str, value: Any, above: str = "") -> Any:
     if isinstance(tables, list) and part.isdecimal() and int(part) < len(tables):
         at = int(part)
         return [*tables[:at], changed(tables[at]), *tables[at + 1 :]]
-    whole, expected = dotted(above, key), f"an entry or a key of {above}"
+    whole = dotted(above, key)
+    expected = f"an entry or a key of {above}"
     message = f"{whole}: {above} is {short_repr(tables)}, which has no {part!r}: expected {expected}"
     raise InputError(message, key=whole, found=value, expected=expected)
 
@@ -279,7 +283,8 @@ def over_realisations(values: xr.DataArray) -> xr.Dataset:
         itself = found["itself"] = values.values[numbers == ITSELF][0]
         mean = found["mean"]
         found["ratio"] = np.divide(itself, mean, out=np.full_like(mean, np.nan), where=mean != 0)
-    units, name = values.attrs.get("units", "1"), str(values.attrs.get("long_name", values.name or "values"))
+    units = values.attrs.get("units", "1")
+    name = str(values.attrs.get("long_name", values.name or "values"))
     variables = {}
     for one, array in found.items():
         unit = "1" if one in ("count", "ratio") else units
@@ -302,10 +307,12 @@ def statistics(values: Array) -> dict[str, Array]:
         middle = np.nansum(logarithms, axis=0) / count
         spread = np.sqrt(np.nansum((logarithms - middle) ** 2, axis=0) / freedom)
         of_mean = student * np.sqrt(spread**2 / count + spread**4 / (2 * freedom))
-        of_patch, centre = student * np.sqrt(1 + 1 / count), middle + spread**2 / 2
+        of_patch = student * np.sqrt(1 + 1 / count)
+        centre = middle + spread**2 / 2
         least = np.fmin.reduce(values, axis=0, initial=np.inf)
         # in logarithms if all values are positive; no interval if some are zero and none is negative
-        positive, zero = least > 0, least == 0
+        positive = least > 0
+        zero = least == 0
         ends = {
             "lower": (np.exp(centre - of_mean), mean - student / np.sqrt(count) * deviation),
             "upper": (np.exp(centre + of_mean), mean + student / np.sqrt(count) * deviation),

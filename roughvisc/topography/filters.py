@@ -77,7 +77,8 @@ def less_polynomial(heights: np.ndarray, order: int) -> np.ndarray:
     i, j = np.indices((order + 1, order + 1)).reshape(2, -1)
     # heights do not vary across a strip
     kept = (i + j <= order) & ((i == 0) | (heights.shape[0] > 1)) & ((j == 0) | (heights.shape[1] > 1))
-    i, j = i[kept], j[kept]
+    i = i[kept]
+    j = j[kept]
     products = [(base[:, :, None] * base[:, None, :]).reshape(len(base), -1) for base in bases]
     moments = np.reshape(products[0].T @ present.astype(float) @ products[1], [order + 1] * 4)
     normal = moments[i[:, None], i, j[:, None], j]

@@ -205,7 +205,8 @@ def combine(
     """
     one_of("flip", flip, (None, "x", "y"))
     apart = _two_lengths("offset", offset)
-    h1, h2 = checked(h1, "combine"), checked(h2, "combine")
+    h1 = checked(h1, "combine")
+    h2 = checked(h2, "combine")
     repeats = is_periodic(h1) and is_periodic(h2) and np.allclose(period_of(h1), period_of(h2), rtol=1e-6, atol=0)
     sha = h2.attrs.get("source_sha256")
     about = "; ".join(str(h2.attrs.get("history", "")).splitlines())

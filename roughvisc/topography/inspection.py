@@ -24,19 +24,25 @@ from roughvisc.units import unit_for
 _HOLES = 0.01
 #: Largest number of blocks along a side that are searched for a part without holes; least share of this part, and its
 #: fewest points along a side.
-_BLOCKS, _LEAST_PART, _FEWEST = 128, 0.1, 16
+_BLOCKS = 128
+_LEAST_PART = 0.1
+_FEWEST = 16
 #: Beyond this share of the points, spikes may be the surface itself.
 _MOST_SPIKES = 0.02
 #: Part of the plane in the rms height, and share of a quadratic form in its square, from which they are subtracted.
-_TILTED, _FORM = 0.01, 0.5
+_TILTED = 0.01
+_FORM = 0.5
 #: Root mean square slopes above and below which a unit or the spacing is probably wrong. [-]
-_STEEP, _FLAT = 1.0, 1e-4
+_STEEP = 1.0
+_FLAT = 1e-4
 #: A white tail of the spectrum falls no steeper than this power of the wavevector over the last octave. If the spectrum
 #: is below this multiple of the tail, noise is at least as strong as the surface.
-_WHITE, _ABOVE = -1.5, 2.0
+_WHITE = -1.5
+_ABOVE = 2.0
 #: A noise floor below this part of the rms height is rounding. Noise below this share of the mean square slope is not
 #: filtered.
-_ROUNDING, _HARMLESS = 1e-6, 0.02
+_ROUNDING = 1e-6
+_HARMLESS = 0.02
 #: Largest share of missing points for which noise is measured.
 _MOST_MISSING = 0.25
 #: Twice the missing points raise a true noise floor by a factor of at most 1.2, an artefact of interpolation by a
@@ -139,8 +145,11 @@ def inspection_of(h: xr.DataArray) -> Inspection:
     """Return the findings in a scan; see :func:`inspect`."""
     h = checked(h, "inspect")
     findings: dict[str, Finding] = {}
-    missing, holes = int(h.isnull().sum()), in_large_holes(np.isnan(h.values))
-    seen, advices, step = f"{missing} ({_percent(missing / h.size)})", list[str](), dict[str, Any]()
+    missing = int(h.isnull().sum())
+    holes = in_large_holes(np.isnan(h.values))
+    seen = f"{missing} ({_percent(missing / h.size)})"
+    advices = list[str]()
+    step = dict[str, Any]()
     has_holes = bool(holes.mean() > _HOLES)
     if has_holes and (part := _clear_part(h, holes)):
         h = crop(h, x=part.get("x"), y=part.get("y"))
@@ -161,7 +170,8 @@ def inspection_of(h: xr.DataArray) -> Inspection:
     few = 0 < spikes <= _MOST_SPIKES * h.size
     kept = masked if few else levelled
     rms_levelled, rms = (float(np.nanstd(one.values)) for one in (levelled, level(kept)))
-    seen, advice = f"{spikes} ({_percent(spikes / h.size)})", "too many to be spikes: check the picture" * (spikes > 0)
+    seen = f"{spikes} ({_percent(spikes / h.size)})"
+    advice = "too many to be spikes: check the picture" * (spikes > 0)
     if few:
         seen += f": Sq is {_length(rms_levelled)} with and {_length(rms)} without them"
         advice = "outliers = true; otherwise the spikes carry the load"
@@ -216,7 +226,8 @@ def _clear_part(h: xr.DataArray, holes: np.ndarray) -> dict[str, Any]:
     side = math.ceil(max(h.shape) / _BLOCKS)  # points along the side of a block
     padded = np.pad(holes, [(0, -n % side) for n in h.shape])
     blocks = np.any(padded.reshape(padded.shape[0] // side, side, -1, side), axis=(1, 3))
-    clear_below, largest = np.zeros(blocks.shape[1], dtype=int), (0, (0, 0), (0, 0))
+    clear_below = np.zeros(blocks.shape[1], dtype=int)
+    largest = (0, (0, 0), (0, 0))
     for row, has_hole in enumerate(blocks):
         clear_below = np.where(has_hole, 0, clear_below + 1)  # clear blocks in each column, up to this row
         open_columns: list[tuple[int, int]] = []  # first column and number of rows of each rectangle that may grow
@@ -228,7 +239,8 @@ def _clear_part(h: xr.DataArray, holes: np.ndarray) -> dict[str, Any]:
             open_columns.append((first, count))
     limits = {}
     for axis, d, n, (first, end) in zip("xy", spacing(h), h.shape, largest[1:], strict=True):
-        first, end = first * side, min(end * side, n)
+        first = first * side
+        end = min(end * side, n)
         if end - first < min(n, _FEWEST):
             return {}
         if end - first < n:
@@ -255,14 +267,17 @@ def _noise(h: xr.DataArray) -> Finding:
     gaps = h["filled"].values.astype(bool) if "filled" in h.coords else np.zeros(h.shape, dtype=bool)
     # points inside or at the edge of large holes are usually artefacts
     gaps = gaps | scipy.ndimage.binary_dilation(in_large_holes(gaps))
-    rms, cell = float(h.values.std()), max(spacing(h))
+    rms = float(h.values.std())
+    cell = max(spacing(h))
     if min(h.shape) < 16 or gaps.mean() > _MOST_MISSING or not rms > 1e-12 * np.abs(h.values).max():
         seen = "not known: the scan is flat, smaller than 16 points, or has too many missing points"
         return Finding(seen, "", {}, {})
     spectrum = _spectrum(h, gaps)
     waves = _complete(spectrum, h)
-    q, density = waves["wavevector"].values, waves["psd"].values
-    octave, area = q > q[-1] / 2, math.prod(spacing(h))
+    q = waves["wavevector"].values
+    density = waves["psd"].values
+    octave = q > q[-1] / 2
+    area = math.prod(spacing(h))
     tail = float(np.median(density[octave]))
     power = float(np.polyfit(np.log(q[octave]), np.log(np.maximum(density[octave], 1e-300)), 1)[0])
     below = np.flatnonzero(scipy.ndimage.median_filter(density, 5, mode="nearest") < _ABOVE * tail)
@@ -274,7 +289,8 @@ def _noise(h: xr.DataArray) -> Finding:
         least = math.sqrt(float(np.median(density[q > 0.8 * q[-1]])) / area)
         seen = f"no noise floor down to two cells; noise is below {_length(least)} rms"
         return Finding(seen, "", {}, {"rms": least, "floor": False})
-    noise, cutoff = math.sqrt(tail / area), float(2 * np.pi / q[below[0] - 1])
+    noise = math.sqrt(tail / area)
+    cutoff = float(2 * np.pi / q[below[0] - 1])
     every = spectrum["wavevector"].values
     slopes = spectrum["psd"].values * spectrum["modes"].values * every**2
     noisy = float(slopes[every > 2 * np.pi / cutoff].sum() / slopes.sum())

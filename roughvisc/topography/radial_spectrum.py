@@ -29,7 +29,8 @@ _FACTORS = {"psd": 1.0, "persson": (2 * math.pi) ** 2}
 # Rings of a scan are averaged over bins, so many in a decade.
 _BINS = 40
 # Values per decade of a spectrum for integrals, and fewest values.
-_PER_DECADE, _FEWEST = 60, 240
+_PER_DECADE = 60
+_FEWEST = 240
 # Density that counts as zero, over the largest one.
 _NOTHING = 1e-60
 # Ratio of the densities of two scans where they overlap, from which a warning is given.
@@ -133,7 +134,8 @@ def join_psd(*spectra: xr.Dataset | xr.DataArray) -> xr.Dataset:
     if len(columns) == 1:
         return _labelled(*columns[0])
     joined = np.unique(np.concatenate([q for q, _ in columns]))
-    total, weights = np.zeros(joined.size), np.zeros(joined.size)
+    total = np.zeros(joined.size)
+    weights = np.zeros(joined.size)
     for q, density in columns:
         inside = np.log(joined / q[0]), np.log(q[-1] / joined)
         weight = np.maximum(np.minimum(*inside), 0.0)
@@ -236,7 +238,8 @@ def _columns(source: Any) -> tuple[Array, Array]:
 
 def _checked_columns(wavevectors: ArrayLike, densities: ArrayLike) -> tuple[Array, Array]:
     """Return two columns of a spectrum as arrays; refuse what is not one."""
-    q, density = np.asarray(wavevectors, dtype=float), np.asarray(densities, dtype=float)
+    q = np.asarray(wavevectors, dtype=float)
+    density = np.asarray(densities, dtype=float)
     if q.ndim != 1 or q.shape != density.shape or q.size < 2:
         found = f"{q.size} wave numbers and {density.size} densities"
         raise InputError(key="densities", found=found, expected="one for each wave number, at least two")

@@ -29,7 +29,9 @@ from roughvisc.units import Quantity, format_quantity, number, quantities
 
 #: Largest side, finest spacing and largest distance of a height from zero. [m] Scans of 150 mm exist; absolute heights
 #: of 76 mm too.
-WIDEST, FINEST, HIGHEST = 1.0, 1e-11, 1.0
+WIDEST = 1.0
+FINEST = 1e-11
+HIGHEST = 1.0
 #: Fewest points for a check of the heights.
 _FEWEST = 16
 #: Heights of an array further from zero than this mark missing points. [m]
@@ -37,7 +39,9 @@ FARTHEST = 1e3
 #: A number marks missing points under four conditions: it is the lowest or highest height, it is at least this large in
 #: the file, it occurs at least this many times, and its distance from the next height exceeds this multiple of the
 #: range of all other heights. Exactly flat pits of a manufactured texture have smaller numbers.
-_NO_DATA, _REPEATED, _FAR = 999.0, 4, 10.0
+_NO_DATA = 999.0
+_REPEATED = 4
+_FAR = 10.0
 #: Usual marks of missing points, by size, for which one range is far enough: heights of 1 um are thousands of nm.
 _MARKS = (9999.0, 99999.0, 999999.0, 32767.0, 32768.0)
 _READER = threading.RLock()
@@ -45,7 +49,8 @@ _READER = threading.RLock()
 _OFF = 0.01
 #: Largest distance between points of one line of the lattice, over the distance between lines; and largest number of
 #: nodes per point.
-_WITHIN, _SPARSE = 0.1, 64
+_WITHIN = 0.1
+_SPARSE = 64
 #: Largest distance of a point from the border of a cell by rounding, in cells.
 _ON_BORDER = 1e-9
 
@@ -91,7 +96,8 @@ def _labelled(file: ScanFile, channel: Channel, given: Mapping[str, Any]) -> xr.
     sides: Any = channel.spacing
     values = np.asarray(raw, dtype=float)
     if channel.kind == "triangles":
-        values, sides = meshed(values, grid / xy, file.complaints), (grid / xy, grid / xy)
+        values = meshed(values, grid / xy, file.complaints)
+        sides = (grid / xy, grid / xy)
     elif channel.kind == "points":
         points = values[np.isfinite(values[:, :2]).all(axis=1)]
         points[:, 2] = _without_no_data(points[:, 2], no_data, file.complaints)
@@ -114,7 +120,8 @@ def _labelled(file: ScanFile, channel: Channel, given: Mapping[str, Any]) -> xr.
     h = checked(h, "an areal scan")
     for axis, d, n in zip(("x", "y"), cell_sides(h), h.shape, strict=True):
         if n * d > WIDEST or d < FINEST:
-            width, side = format_quantity(n * d, "m"), format_quantity(d, "m")
+            width = format_quantity(n * d, "m")
+            side = format_quantity(d, "m")
             found = f"it is {width} wide along {axis} at a spacing of {side}, which is not plausible"
             expected = "another unit or spacing, and height_scale if its heights are in another unit too"
             raise InputError(f"{found} (at most {WIDEST:g} m, at least {FINEST:g} m): expected {expected}")
@@ -147,7 +154,8 @@ def _metres(channel: Channel, given: Mapping[str, Any]) -> tuple[float, float]:
             raise InputError(
                 key="unit", found=given["unit"], expected=f"x and y in {channel.lateral_unit}, as in the file"
             )
-    xy, z = channel.lateral_unit or lateral or "m", stated or vertical
+    xy = channel.lateral_unit or lateral or "m"
+    z = stated or vertical
     return number(f"1 {xy}", "m", "unit"), number(f"1 {z}", "m", "unit")
 
 
@@ -359,7 +367,8 @@ def lattice(points: np.ndarray) -> tuple[np.ndarray, tuple[float, float]] | None
     steps : tuple of float
         Along x and y, in the unit of the points.
     """
-    at, nodes = points[:, :2], np.empty((len(points), 2))
+    at = points[:, :2]
+    nodes = np.empty((len(points), 2))
     for axis in (0, 1):
         ordered = np.sort(at[:, axis])
         gaps = np.diff(ordered)
@@ -394,7 +403,8 @@ def gridded(points: np.ndarray, side: float) -> np.ndarray:
         Side of the cells, in the unit of the points.
     """
     points = points[np.isfinite(points).all(axis=1)]
-    low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+    low = points[:, :2].min(axis=0)
+    high = points[:, :2].max(axis=0)
     shape = np.maximum(np.ceil((high - low) / side - _ON_BORDER), 1)
     if min(shape) < 2 or np.prod(shape) > MOST_CELLS:
         raise InputError(key="grid", found=side, expected=f"a side that fits at least twice into {high - low}")

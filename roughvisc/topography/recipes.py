@@ -407,7 +407,8 @@ def finest_wave(size: tuple[float, float], shape: tuple[int, int], anisotropy: f
 
 
 def _indenter(name: str, parameters: dict[str, Any], size: Any, shape: Any) -> xr.DataArray:
-    size, shape = pair("size", size), cells(shape)
+    size = pair("size", size)
+    shape = cells(shape)
     x = (np.arange(shape[0]) + 0.5) * (size[0] / shape[0]) - size[0] / 2
     y = (np.arange(shape[1]) + 0.5) * (size[1] / shape[1]) - size[1] / 2
     heights = _INDENTERS[name](x[:, None], y, **parameters)
@@ -435,8 +436,10 @@ def indenter_of(h: xr.DataArray) -> tuple[Callable[..., np.ndarray], tuple[float
     try:
         recipe = json.loads(h.attrs["recipe"])
         evaluate = partial(_INDENTERS[recipe["name"]], **recipe["parameters"])
-        (width, depth), (nx, ny) = recipe["size"], recipe["shape"]
-        cell, centre = (width / nx, depth / ny), (width / 2, depth / 2)
+        width, depth = recipe["size"]
+        nx, ny = recipe["shape"]
+        cell = (width / nx, depth / ny)
+        centre = (width / 2, depth / 2)
         expected = evaluate(h["x"].values[:, None] - centre[0], h["y"].values - centre[1])
     except (KeyError, TypeError, ValueError, IndexError, ZeroDivisionError, AttributeError):
         return None
@@ -550,7 +553,8 @@ def surrogate(h: xr.DataArray, number: int, *, seed: int = 0) -> xr.DataArray:
     if is_mirrored(h):
         h = h[: h.shape[0] // 2, : h.shape[1] // 2]  # the part that was measured
     repeating = h if is_periodic(h) else mirror(h)
-    spectrum, step = psd(repeating), 2 * np.pi / min(period_of(repeating))  # the width of its rings
+    spectrum = psd(repeating)
+    step = 2 * np.pi / min(period_of(repeating))  # the width of its rings
     sides = spacing(h)
     q_x, q_y, _ = waves_of_grid(h.shape, sides)
     q = np.hypot(q_x[:, None], q_y)

@@ -141,7 +141,8 @@ def open_scan(
     about, table = read_card(path)
     try:
         one_key("the card", table, ("file", "generate"))
-        stated, file = about.pop("sha256", None), table.get("file")
+        stated = about.pop("sha256", None)
+        file = table.get("file")
         if stated and file and stated.lower() != (found := sha256(existing(file, "file"))):
             expected = f"{found}, that of {Path(file).name}, which was changed or damaged"
             raise InputError(key="sha256", found=stated, expected=expected)
@@ -182,7 +183,8 @@ def save_scan(h: xr.DataArray, path: _Path) -> None:
     >>> bool((again == rough).all())
     True
     """
-    h, path = checked(h, "save_scan"), path_of(path, "path")
+    h = checked(h, "save_scan")
+    path = path_of(path, "path")
     known_suffix(path)
     if path.suffix.lower() == ".nc":
         compressed: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}

@@ -68,7 +68,8 @@ TAKEN = "not verified: rows are taken to run along x and the first to be y = 0; 
 
 def open_file(path: Path, format: str | None) -> ScanFile:
     """Read the header of a scan file; find its format by name, or else by suffix."""
-    names, failures = _formats_of(path) if format is None else (format,), list[str]()
+    names = _formats_of(path) if format is None else (format,)
+    failures = list[str]()
     for name in names:
         default = partial(binary.read_with_surface_topography, format=name)
         try:

@@ -20,7 +20,8 @@ _TYPES |= {"float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": 
 _TYPES |= {"int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8"}
 _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
 #: Largest number of pairs of a triangle and a cell that are tested together, and rounding of a corner on a centre.
-_PAIRS, _ON_EDGE = 1_000_000, 1e-9
+_PAIRS = 1_000_000
+_ON_EDGE = 1e-9
 
 
 def read_stl(path: Path) -> ScanFile:
@@ -66,7 +67,8 @@ def read_ply(path: Path) -> ScanFile:
             rows[name] = {}
             for field in kind.names or ():
                 size = int(np.prod(kind[field].shape))
-                rows[name][field], part = np.squeeze(part[:, :size]), part[:, size:]
+                rows[name][field] = np.squeeze(part[:, :size])
+                part = part[:, size:]
         else:
             table = np.frombuffer(body, kind, count, position)
             position += count * kind.itemsize

@@ -150,7 +150,8 @@ def _matrix(channel: Channel, complaints: list[str]) -> Channel:
     spacing = channel.spacing
     taken = "an index"
     if row and column and not is_index:
-        spacing, taken = spacing or (abs(row), abs(column)), "coordinates"
+        spacing = spacing or (abs(row), abs(column))
+        taken = "coordinates"
     complaints.append(f"the numbers of its first {removed} are in equal steps: taken as {taken}, not as heights")
     return replace(channel, load=lambda: z.T, spacing=spacing)
 
@@ -190,7 +191,8 @@ def read_zygo(text: str) -> ScanFile:
         phases = [np.array(section.split(), dtype=float) for section in sections]
         (counts,) = [phase for phase in phases if phase.size == columns * rows][-1:]
         heights = np.where(counts < _MISSING_COUNT, counts * (wave / _COUNTS[int(lines[10].split()[0])]), np.nan)
-        unit, heights = "m", heights.reshape(rows, columns).T
+        unit = "m"
+        heights = heights.reshape(rows, columns).T
     return single_map("zygo", heights, unit, "m", (side, side) if side > 0 else None)
 
 
