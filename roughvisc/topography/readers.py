@@ -321,7 +321,7 @@ def laid_out(
         if empty := int(np.isnan(heights).sum()):
             complaints.append(f"{empty} of {heights.size} cells of the grid hold no point")
         return heights, (side, side)
-    if (found := lattice(points)) is None:
+    if (found := lattice_of(points)) is None:
         side = float(f"{2 * metres * math.sqrt(spread[0] * spread[1] / len(points)):.1g}")
         proposed = f'grid = "{format_quantity(side, "m").replace("µ", "u")}"'
         text = f"its {len(points)} points lie on no regular lattice: expected {proposed}, or similar"
@@ -352,7 +352,7 @@ def meshed(corners: np.ndarray, side: float, complaints: list[str]) -> np.ndarra
     return heights
 
 
-def lattice(points: np.ndarray) -> tuple[np.ndarray, tuple[float, float]] | None:
+def lattice_of(points: np.ndarray) -> tuple[np.ndarray, tuple[float, float]] | None:
     """Return the heights and steps of the lattice of some points, to a hundredth of a step; None without a lattice.
 
     Parameters
