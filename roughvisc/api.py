@@ -237,8 +237,8 @@ def friction(
     """
     curve = SteadySliding(speeds=speeds, load=load, pressure=pressure, direction=direction, heating=heating)
     settings = {"boundary": boundary, "tolerance": tolerance, "fields": fields, "grid_error": grid_error}
-    found = _solved(height, material, curve, settings, numerics, 4, progress=progress, threads=threads)
-    return found.assign_attrs(title="Steady sliding")
+    result = _solved(height, material, curve, settings, numerics, 4, progress=progress, threads=threads)
+    return result.assign_attrs(title="Steady sliding")
 
 
 def _solved(

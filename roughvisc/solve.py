@@ -161,9 +161,10 @@ def solve(
 
             def on_coarser(few: xr.DataArray, times: list[float]) -> xr.Dataset:
                 coarse = replace(problem, height=few, settings=replace(settings, fields=("pressure",), times=times))
-                found = solve_on_grid(coarse, loads, Recorder())
-                apart = np.abs(found["time"].values[:, None] - times)  # in a slide times differ by half a coarser cell
-                return found.isel(time=apart.argmin(axis=0))
+                dataset = solve_on_grid(coarse, loads, Recorder())
+                # in a slide times differ by half a coarser cell
+                apart = np.abs(dataset["time"].values[:, None] - times)
+                return dataset.isel(time=apart.argmin(axis=0))
 
             dataset = with_grid_error(dataset, height, on_coarser).drop_vars(needed)
     if experiment.axis == "time":

@@ -110,8 +110,8 @@ def name_and_unit(heading: str) -> tuple[str, str]:
     >>> name_and_unit("Force (left) [mN]"), name_and_unit("fluidity [1/(Pa s)]"), name_and_unit("time")
     (('Force (left)', 'mN'), ('fluidity', '1/(Pa s)'), ('time', ''))
     """
-    found = _HEADING.fullmatch(heading.strip())
-    return (found["name"], found["square"] or found["round"] or "") if found else (heading.strip(), "")
+    matched = _HEADING.fullmatch(heading.strip())
+    return (matched["name"], matched["square"] or matched["round"] or "") if matched else (heading.strip(), "")
 
 
 class Wanted(NamedTuple):
@@ -280,7 +280,7 @@ def _plain(name: str) -> str:
 def _no_heading(path: Path, rows: Sequence[_Row], separator: str, wanted: Mapping[str, Wanted]) -> InputError:
     """Return the error of a table without a heading; it states the heading to write."""
     sign = {",": ", ", ";": "; "}.get(separator, separator)
-    write = sign.join(_example(one.name, one.unit) for one in wanted.values() if not one.optional)
+    write = sign.join(_example(column.name, column.unit) for column in wanted.values() if not column.optional)
     line, widest = max(rows[:_FIRST], key=lambda row: len(row[1]), default=(0, ["no rows"]))
     found = f"found {sign.join(widest)[:200]!r} in line {line}"
     return InputError(f"{path}: {found}: expected a heading, {write!r}", found=found, expected=write)
@@ -470,7 +470,7 @@ def _export_heading(
     path: Path, lines: list[tuple[int, str]], wanted: Mapping[str, Wanted]
 ) -> tuple[int, str, list[str], dict[str, int]]:
     """Return the place of the line of the names, the separator, the names, and the position of each wanted column."""
-    needed = [one.name for one in wanted.values() if not one.optional]
+    needed = [column.name for column in wanted.values() if not column.optional]
     best: tuple[int, list[str], str] = (0, [], "")
     for is_comment in (False, True):  # names may be in a comment
         for above, (line, text) in enumerate(lines):
@@ -485,7 +485,7 @@ def _export_heading(
                     best = line, missing, text
                 if missing:
                     continue
-                positions = {key: found for key, one in wanted.items() if (found := _places(heading, one.name))}
+                positions = {key: found for key, column in wanted.items() if (found := _places(heading, column.name))}
                 for key, found in positions.items():
                     if len(found) > 1:
                         names = ", ".join(heading[place] for place in found)

@@ -22,7 +22,9 @@ ADDED = {
     },
     "conditioning step": {
         "topography/conditioning.py": {
-            "STEPS: dict[str, ConditioningStep] = {\n": '    "raised": ConditioningStep(lambda h, by: h.copy(data=h.values + by), "by"),\n'
+            "STEPS: dict[str, ConditioningStep] = {\n": (
+                '    "raised": ConditioningStep(lambda h, by: h.copy(data=h.values + by), "by"),\n'
+            )
         }
     },
     "material": {

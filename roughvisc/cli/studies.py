@@ -164,14 +164,14 @@ def parse_targets(texts: Sequence[str]) -> dict[str, str]:
     from roughvisc.judge.budget import QUANTITIES  # slow to import
     from roughvisc.units import is_quantity
 
-    found: dict[str, str] = {}
+    targets: dict[str, str] = {}
     for text in texts:
         amount, _, name = text.strip().rpartition(" ")
-        if name not in QUANTITIES or name in found or not is_quantity(amount, "1"):
+        if name not in QUANTITIES or name in targets or not is_quantity(amount, "1"):
             expected = f"a target such as '1 % contact_area', once for each number, of {', '.join(QUANTITIES)}"
             raise InputError(key="for", found=text, expected=expected)
-        found[name] = amount
-    return found
+        targets[name] = amount
+    return targets
 
 
 def _chosen(
@@ -222,8 +222,8 @@ def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, 
     from roughvisc.runs.sweep import run_study
     from roughvisc.runs.sweep_data import numbers_of, sweep_cases
 
-    found = run_study(cases, folder, client=client, display=Display(not console.quiet, console), **computing)
-    outcomes = list(found.values())
+    outcome_of_key = run_study(cases, folder, client=client, display=Display(not console.quiet, console), **computing)
+    outcomes = list(outcome_of_key.values())
     numbers = numbers_of(sweep_cases(cases))
     console.print(sweep_table(outcomes, len(cases), cases[0].title))
     for what, path in (("Results", folder), ("Table of cases", folder / CASES), ("Log", folder / LOG)):
@@ -260,12 +260,12 @@ def trade(study: Path, out: Path | None, accuracy: str, quantity: str | None, qu
     from roughvisc.runs.run import result_folder
     from roughvisc.units import number
 
-    part = number(accuracy, "1", "accuracy", above=0, below=1)
+    error = number(accuracy, "1", "accuracy", above=0, below=1)
     case = rv.read_study(study)
     console = screen(quiet)
     folder = out or result_folder(case) / FOLDER
     dataset = rv.trade(case, quantity=quantity or (), out=folder, progress=not quiet)
-    console.print(trade_table(dataset, str(dataset["quantity"].values[0]), part))
+    console.print(trade_table(dataset, str(dataset["quantity"].values[0]), error))
     _write(console, "Trade", dataset, folder / "trade.nc", rv.plot.trade)
 
 
@@ -303,9 +303,9 @@ def budget(study: Path, out: Path | None, workers: int | None, quiet: bool, **kn
     names = list(known.pop("quantity")) or ["contact_area"]
     case = rv.read_study(study)
     folder = out or result_folder(case) / FOLDER
-    found = rv.budget(case, names, **known, out=folder, workers=workers, progress=not quiet)
+    uncertainties = rv.budget(case, names, **known, out=folder, workers=workers, progress=not quiet)
     for name in names:
-        _show_budget(screen(quiet), found.sel(quantity=name), folder, name)
+        _show_budget(screen(quiet), uncertainties.sel(quantity=name), folder, name)
 
 
 def _show_budget(console: Console, found: xr.Dataset, folder: Path, name: str, plots: bool = True) -> None:

@@ -182,5 +182,7 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Group:
 
 def findings_table(found: Inspection) -> Group:
     """Return the findings in a scan, each with its recommendation."""
-    rows = [(name, f"{one.seen}\n-> {one.advice or 'no action needed'}") for name, one in found.findings.items()]
+    rows = [
+        (name, f"{finding.seen}\n-> {finding.advice or 'no action needed'}") for name, finding in found.findings.items()
+    ]
     return two_columns(rows, "Findings and recommendations")

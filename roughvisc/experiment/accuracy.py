@@ -109,15 +109,15 @@ def shortest_age(program: Program, settings: Settings) -> float:
 def series_of_run(material: Material, program: Program, settings: Settings) -> Prony:
     """Return the series that a run uses in place of a creep function, with the error of the series."""
     memory = memory_of(Body(material), program, settings)
-    found = memory.series
+    series = memory.series
     if not memory.series_error:
-        return found
+        return series
     return creep_series(
-        found.glassy,
-        found.fluidity,
-        found.compliances,
-        found.times,
-        found.poisson,
+        series.glassy,
+        series.fluidity,
+        series.compliances,
+        series.times,
+        series.poisson,
         error=memory.series_error,
         shortest=memory.shortest,
         longest=program.duration,
@@ -161,8 +161,8 @@ def error_columns(step: Step, scene: Scene) -> dict[str, float]:
     age = point.time - scene.program.corners[step.segment]
     if age > 0 and scene.memory.early > 0:
         change = (point.force - point.start) / loaded if control == "load" else (point.approach - point.start) / reached
-        part = 1.0 if age < scene.memory.shortest else min(abs(change), 1.0)
-        series_error += part * scene.memory.error_of_young(age)
+        share = 1.0 if age < scene.memory.shortest else min(abs(change), 1.0)
+        series_error += share * scene.memory.error_of_young(age)
     of_force = series_error * loaded
     if remembers:
         solved = point.solver_error + INHERITED * state.solver_error
@@ -420,7 +420,7 @@ def wake_warning(left: Mapping[float, float], period: float) -> str:
     period : float
         Period along the motion. [m]
     """
-    speeds = sorted(speed for speed, part in left.items() if part >= _LEFT)
+    speeds = sorted(speed for speed, share in left.items() if share >= _LEFT)
     if not speeds:
         return ""
     slowest = format_quantity(speeds[0], "m/s")

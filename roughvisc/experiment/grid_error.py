@@ -177,8 +177,8 @@ def with_grid_error(
             for name in ("force", "contact_area")
         )
         pressures.append(force.over(area))
-    most = np.fmax.reduce([one.value for one in pressures], initial=_ZERO)
-    errors[VARIABLES["mean_contact_pressure"].grid_error] = np.array([one.error / most for one in pressures])
+    most = np.fmax.reduce([pressure.value for pressure in pressures], initial=_ZERO)
+    errors[VARIABLES["mean_contact_pressure"].grid_error] = np.array([pressure.error / most for pressure in pressures])
     return dataset.assign({name: ("time", values) for name, values in errors.items()})
 
 
@@ -226,10 +226,10 @@ def hidden_peak(height: Array, periodic: bool) -> float:
         Whether the surface repeats.
     """
     beyond: Any = "wrap" if periodic else "clip"
-    at = np.unravel_index(int(np.nanargmax(height)), height.shape)
-    lines = (height[:, at[1]], height[at[0]])
-    lowest = (np.fmin.reduce(line.take([i - 1, i, i + 1], mode=beyond)) for line, i in zip(lines, at, strict=True))
-    return float(sum(height[at] - low for low in lowest)) / 2
+    highest = np.unravel_index(int(np.nanargmax(height)), height.shape)
+    lines = (height[:, highest[1]], height[highest[0]])
+    lowest = (np.fmin.reduce(line.take([i - 1, i, i + 1], mode=beyond)) for line, i in zip(lines, highest, strict=True))
+    return float(sum(height[highest] - low for low in lowest)) / 2
 
 
 def _least_errors(
@@ -285,8 +285,8 @@ def _least_errors(
     least["pressure"] = max(least["pressure"], unknown * force)
     least["contact_area"] = max(least["contact_area"], counting_error(contact, faces + outline) * counted)
     # The edge of the material: a wider punch sinks in less, or carries more.
-    found = "force" if given else "approach"
-    least[found] = max(least[found], counting_error(contact, ends))
+    solved_for = "force" if given else "approach"
+    least[solved_for] = max(least[solved_for], counting_error(contact, ends))
     return least
 
 
@@ -318,15 +318,16 @@ def hidden_opening(pressure: Array, height: Array, periodic: bool) -> tuple[floa
     present = np.isfinite(height)
     if not (pressure[present] > 0).all():
         return 0.0, 0.0
-    at = np.unravel_index(int(np.argmin(np.where(present, pressure, math.inf))), pressure.shape)
+    lowest = np.unravel_index(int(np.argmin(np.where(present, pressure, math.inf))), pressure.shape)
     beyond: dict[str, Any] = {"mode": "wrap"} if periodic else {"constant_values": math.nan}
-    beside = at[0] + np.array([0, 2, 1, 1]), at[1] + np.array([1, 1, 0, 2])  # counted from the cells beyond the border
-    changes = np.pad(np.where(present, pressure, math.nan), 1, **beyond)[beside] - pressure[at]
-    steps = np.pad(height, 1, **beyond)[beside] - height[at]
+    # counted from the cells beyond the border
+    beside = (lowest[0] + np.array([0, 2, 1, 1]), lowest[1] + np.array([1, 1, 0, 2]))
+    changes = np.pad(np.where(present, pressure, math.nan), 1, **beyond)[beside] - pressure[lowest]
+    steps = np.pad(height, 1, **beyond)[beside] - height[lowest]
     if np.isnan(changes).all():
         return 0.0, 0.0
-    part = _HIDDEN * np.count_nonzero(pressure[present] <= np.nanmax(changes)) / np.count_nonzero(present)
-    return part, part * float(np.nanmax(np.abs(steps)))
+    share = _HIDDEN * np.count_nonzero(pressure[present] <= np.nanmax(changes)) / np.count_nonzero(present)
+    return share, share * float(np.nanmax(np.abs(steps)))
 
 
 def counting_error(contact: Mask, faces: int) -> float:

@@ -389,8 +389,8 @@ class LoadingRows(Rows):
                 beyond["gap"] = np.maximum(profile.gap + beyond["displacement"] - point.approach, 0.0)
         fields = {}
         for name in names:
-            found = {"pressure": point.stored_pressure, "displacement": displacement, "gap": gap}
-            fields[name] = to_host(found[name])
+            columns = {"pressure": point.stored_pressure, "displacement": displacement, "gap": gap}
+            fields[name] = to_host(columns[name])
             if beyond:
                 beyond[name][domain.cells] = fields[name]
                 fields[name] = beyond[name]

@@ -129,7 +129,7 @@ class SteadySliding(Experiment):
             raise InputError(key="heating", found=self.heating, expected="rv.Heating(...)")
 
     def __repr__(self) -> str:
-        ends = dict.fromkeys(format_quantity(one, "m/s") for one in (min(self.speeds), max(self.speeds)))
+        ends = dict.fromkeys(format_quantity(speed, "m/s") for speed in (min(self.speeds), max(self.speeds)))
         count = f"{len(self.speeds)} speeds from " if len(self.speeds) > 1 else ""
         pressed = format_quantity(self.pressure or 0.0, "Pa") if self.load is None else format_quantity(self.load, "N")
         return f"Steady sliding: {count}{' to '.join(ends)} along {self.direction}, under {pressed}"
@@ -154,8 +154,8 @@ class SteadySliding(Experiment):
         if "displacement" in settings.fields:
             yield "fields", "displacement", "some of pressure, gap in steady sliding"
         for name in OVER_TIME:
-            if (found := getattr(settings, name)) != (usual := getattr(Settings, name)):
-                yield name, found, f"the default in steady sliding, {usual!r}"
+            if (value := getattr(settings, name)) != (usual := getattr(Settings, name)):
+                yield name, value, f"the default in steady sliding, {usual!r}"
 
     def facts(self, body: Body, height: xr.DataArray) -> dict[str, Any]:
         """Return facts about the body after the time in which the surface slides past a point, at the lowest speed."""
@@ -286,9 +286,9 @@ class SlidingRows(Rows):
             if self._settings.grid_error:
                 row |= sliding_grid_errors(self._grids, pressure, runs)
             if stands_alone(self.profile.height, pressure, 0):
-                for one in warm.law.materials:  # without an end of the creep nothing counts as recovered
-                    crept = float(one.contact_compliance(self._period / warm.seen))
-                    creep = max(creep, 1.0 - crept / float(one.contact_compliance(math.inf)))
+                for material in warm.law.materials:  # without an end of the creep nothing counts as recovered
+                    crept = float(material.contact_compliance(self._period / warm.seen))
+                    creep = max(creep, 1.0 - crept / float(material.contact_compliance(math.inf)))
             row["creep_left"] = creep  # left when the next contact arrives
             if self._curve.heating is not None:
                 row["temperature"] = self._curve.heating.temperature + warm.rise

@@ -103,12 +103,12 @@ def clusters(dataset: xr.Dataset) -> xr.Dataset:
 
     cell = math.prod(spacing(dataset, "clusters"))
     count, mean, largest = frame_by_frame(measure, contact(dataset), outputs=[(), (), ()])
-    found = {
+    columns = {
         "cluster_count": count.astype("int64"),
         "cluster_area_mean": mean * cell,
         "cluster_area_largest": largest * cell,
     }
-    return label(xr.Dataset(found))
+    return label(xr.Dataset(columns))
 
 
 def distribution(
@@ -405,9 +405,9 @@ def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str]) -> xr.D
     if isinstance(resistivity, str) or not isinstance(resistivity, Sequence) or len(resistivity) != 2:
         wanted = 'a list of two, one of each body, in K m/W or, as strings such as "2e-8 ohm m", in ohm m'
         raise InputError(key="resistivity", found=resistivity, expected=wanted)
-    texts = [one for one in resistivity if isinstance(one, str) and not is_quantity(one, "1")]
-    kind = "electrical" if any(is_quantity(one, _UNITS["electrical"]) for one in texts) else "thermal"
-    both = [number(one, _UNITS[kind], "resistivity") for one in resistivity]
+    texts = [value for value in resistivity if isinstance(value, str) and not is_quantity(value, "1")]
+    kind = "electrical" if any(is_quantity(value, _UNITS["electrical"]) for value in texts) else "thermal"
+    both = [number(value, _UNITS[kind], "resistivity") for value in resistivity]
     if min(both) < 0 or sum(both) == 0:
         raise InputError(key="resistivity", found=resistivity, expected="none below zero, and not both zero")
     touching = contact(dataset)

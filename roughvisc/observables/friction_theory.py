@@ -170,7 +170,7 @@ def _speeds(speeds: Any) -> list[float]:
     values = listed(speeds, "m/s", "speeds").tolist()
     if not values:
         raise InputError(key="speeds", found=speeds, expected="at least one speed [m/s]")
-    return [number(one, "m/s", "speeds", above=0) for one in values]
+    return [number(speed, "m/s", "speeds", above=0) for speed in values]
 
 
 def _decades(q: Array) -> Array:

@@ -64,12 +64,12 @@ def pull_off(dataset: xr.Dataset) -> xr.Dataset:
     tension = np.minimum(force, 0.0)
     moved = np.minimum(np.diff(approach), 0.0)
     work = 0.5 * (tension[1:] + tension[:-1]) * moved
-    found = np.zeros((3, len(cycles)))
+    columns = np.zeros((3, len(cycles)))
     for number, (begin, end) in enumerate(cycles):
         inside = np.flatnonzero((time >= begin) & (time <= end))
         lowest = inside[np.argmin(tension[inside])]
         pulls = tension[lowest] < 0
-        found[:, number] = -tension[lowest], time[lowest] if pulls else np.nan, work[inside[:-1]].sum()
+        columns[:, number] = -tension[lowest], time[lowest] if pulls else np.nan, work[inside[:-1]].sum()
     names = ("pull_off_force", "pull_off_time", "work_of_separation")
-    variables = {name: ("cycle", values) for name, values in zip(names, found, strict=True)}
+    variables = {name: ("cycle", values) for name, values in zip(names, columns, strict=True)}
     return label(xr.Dataset(variables, {"cycle": np.arange(len(cycles)) + 1}))

@@ -220,7 +220,9 @@ def friction_of_waves(sliding: Sliding, height: Array, pressure: float) -> tuple
     power = wavevectors(height.shape, (1.0, 1.0))[2] * np.abs(waves) ** 2
     stiffness = np.divide(1.0, sliding.response, where=length > 0, out=np.zeros(waves.shape, complex))
     order = np.argsort(length, axis=None)
-    stress, drag = ((power * part).ravel()[order] for part in (np.abs(stiffness) ** 2, -sliding.qx * stiffness.imag))
+    stress, drag = (
+        (power * factor).ravel()[order] for factor in (np.abs(stiffness) ** 2, -sliding.qx * stiffness.imag)
+    )
     sorted_length = length.ravel()[order]
     first = np.flatnonzero(np.diff(sorted_length, prepend=-1.0) > _SAME * sorted_length)
     own = np.add.reduceat(stress, first)

@@ -207,7 +207,9 @@ class Case:
 
     def with_fields(self, **changes: Any) -> Case:
         """Return the case with other values of some attributes, which are not checked."""
-        return _made({one.name: getattr(self, one.name) for one in dataclasses.fields(self)} | changes)
+        return _made(
+            {attribute.name: getattr(self, attribute.name) for attribute in dataclasses.fields(self)} | changes
+        )
 
     def __repr__(self) -> str:
         """Return title, surface, material, experiment and varied values in one line."""
@@ -413,7 +415,7 @@ def _made(values: Mapping[str, Any]) -> Case:
 def _with_paths(stated: Any, change: Callable[[str], str], key: str = "") -> Any:
     """Return tables in which the paths of files are changed."""
     if isinstance(stated, Mapping):
-        return {name: _with_paths(one, change, name) for name, one in stated.items()}
+        return {name: _with_paths(inner, change, name) for name, inner in stated.items()}
     is_path = key == "origin" or key.rpartition(".")[2] == "file"
     return change(stated) if is_path and isinstance(stated, str) else stated
 
@@ -600,14 +602,14 @@ def vary(case: Case, changes: Mapping[str, Any], *, zip: bool = False) -> Any:
     """
     case = case_given(case)
     choices = {key: _choices(key, value) for key, value in a_table("changes", changes).items()}
-    lengths = {key: len(one) for key, one in choices.items() if one is not None}
+    lengths = {key: len(options) for key, options in choices.items() if options is not None}
     if not lengths:
         return changed(case, changes)
     if zip and len(set(lengths.values())) > 1:
         raise InputError(key="changes", found=lengths, expected="lists of one length")
     if (count := max(lengths.values()) if zip else math.prod(lengths.values())) > MOST_CASES:
         raise InputError(key="changes", found=f"{count} cases", expected=f"at most {MOST_CASES}")
-    lists = [one or [("", changes[key])] * (count if zip else 1) for key, one in choices.items()]
+    lists = [options or [("", changes[key])] * (count if zip else 1) for key, options in choices.items()]
     chosen = builtins.zip(*lists, strict=True) if zip else itertools.product(*lists)
     cases = []
     for values in chosen:
@@ -622,20 +624,20 @@ def _choices(key: str, value: Any) -> list[tuple[str, Any]] | None:
     """Return the names and values to choose from; None for a single value."""
     if isinstance(value, Mapping):
         parts = list(value.values())
-        of_objects = key in _OBJECTS and all(isinstance(one, Mapping) or _is_object(key, one) for one in parts)
+        of_objects = key in _OBJECTS and all(isinstance(choice, Mapping) or _is_object(key, choice) for choice in parts)
         if not value or not (of_objects or key.rpartition(".")[2] in TABLE_OF):
             return None
-        return [(str(name), one) for name, one in value.items()]
+        return [(str(name), choice) for name, choice in value.items()]
     if not isinstance(value, list):
         return None
-    several = [isinstance(one, list | tuple) or _is_object(key, one) for one in value]
+    several = [isinstance(choice, list | tuple) or _is_object(key, choice) for choice in value]
     if key.rpartition(".")[2] in _LISTS and not (value and all(several)):
         return None
     if not value:
         raise InputError(key=key, found=value, expected="at least one value; a tuple is one value")
     names = ["" for _ in value]
-    if key in _OBJECTS and all(_is_object(key, one) for one in value):
-        names = [str(place) if key == "surface" else short_repr(one) for place, one in enumerate(value)]
+    if key in _OBJECTS and all(_is_object(key, choice) for choice in value):
+        names = [str(place) if key == "surface" else short_repr(choice) for place, choice in enumerate(value)]
         for name, count in Counter(names).items():
             if count > 1:
                 raise InputError(key=key, found=name, expected=f"different names, not {count} equal ones: a dictionary")
@@ -686,23 +688,23 @@ def changed(
             written[dotted_key] = key
     folder = case.origin and case.origin.parent
     try:
-        found = _case_of(case.tables, case.origin, folder, placed, leaves_out=leaves_out, heights=heights)
+        made = _case_of(case.tables, case.origin, folder, placed, leaves_out=leaves_out, heights=heights)
         if function is not None:
-            table = material_table(function, found.experiment, found.settings)
-            late = found.late_times
-            found = _case_of(found.tables, case.origin, folder, {"material": table}, heights=heights)
+            table = material_table(function, made.experiment, made.settings)
+            late = made.late_times
+            made = _case_of(made.tables, case.origin, folder, {"material": table}, heights=heights)
             is_series = table["model"] == creep_series.__name__
-            found = found.with_fields(late_times=late, function=function if is_series else None)
+            made = made.with_fields(late_times=late, function=function if is_series else None)
     except InputError as error:
         stated = as_written(error, {key: key.rpartition(".")[0] for key, own in written.items() if own != key})
         raise (stated.prefixed(str(case.origin)) if case.origin else stated) from error
     varied = {}
     for key in changes:
         stated = f"{TABLE_OF[key]}.{key}" if key in TABLE_OF else key
-        varied[key] = names.get(key) or value_at(found.tables, stated, changes[key])
+        varied[key] = names.get(key) or value_at(made.tables, stated, changes[key])
         if _is_object(key, changes[key]):
             varied[key] = names.get(key) or short_repr(changes[key])
-    return found.with_fields(varied={**case.varied, **varied})
+    return made.with_fields(varied={**case.varied, **varied})
 
 
 def _plain_value(value: Any) -> Any:
@@ -734,8 +736,8 @@ def as_written(error: InputError, tables: Mapping[str, str]) -> InputError:
     if table not in (tables.get(name), tables.get(f"{table}.{name}")) or not rest:
         return error
     message = str(error)
-    at = message.find(error.key)
-    message = message[:at] + message[at + len(table) + 1 :] if at >= 0 else f"{rest}: {message}"
+    start = message.find(error.key)
+    message = message[:start] + message[start + len(table) + 1 :] if start >= 0 else f"{rest}: {message}"
     return type(error)(message, key=rest, found=error.found, expected=error.expected, transient=error.transient)
 
 

@@ -133,9 +133,9 @@ def _texts(key: str, value: Any) -> str:
     if isinstance(value, list) and len(value) > _LISTED:
         return f"{_texts(key, value[0])} to {_texts(key, value[-1])} ({len(value)} values)"
     if isinstance(value, list):
-        return ", ".join(_texts(key, one) for one in value)
+        return ", ".join(_texts(key, inner) for inner in value)
     if isinstance(value, Mapping):
-        return ", ".join(f"{name.replace('_', ' ')} {_texts(f'{key}.{name}', one)}" for name, one in value.items())
+        return ", ".join(f"{name.replace('_', ' ')} {_texts(f'{key}.{name}', inner)}" for name, inner in value.items())
     return value_text(key, value)
 
 

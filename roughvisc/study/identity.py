@@ -67,20 +67,20 @@ def digest(stated: Any) -> str:
 
 def checksums_of(surface: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return checksums of the scan or recipe of each face and of its surface card, without the origin of the card."""
-    found = []
+    checksums = []
     for face in filter(None, (surface, surface.get("second"))):
         if "file" not in face:
-            found.append((digest(_recipe(face)), ""))
+            checksums.append((digest(_recipe(face)), ""))
             continue
         path = Path(face["file"])
         card = split(read_card(path)[1], "file")[1] if is_card(path) else {}
         scan = measured_file(path)
         try:
             content = digest(card) if scan is None else digest_in(scan.name) or sha256(scan)
-            found.append((content, digest(card) if card else ""))
+            checksums.append((content, digest(card) if card else ""))
         except InputError as error:
             raise located(error, "surface.file") from error
-    return found
+    return checksums
 
 
 def surface_identity(surface: Mapping[str, Any], checksums: Sequence[tuple[str, str]]) -> list[Any]:
@@ -120,31 +120,31 @@ def _with_steps(source: list[Any], *stages: dict[str, Any]) -> list[Any]:
 def _recipe(face: Mapping[str, Any]) -> list[Any]:
     """Return the name of a recipe and all its arguments."""
     recipe = RECIPES[face["generate"]]
-    found = _stated(recipe, split(face, *arguments(recipe))[0])
-    if recipe is self_affine and found["shortcut"] is None:
-        found["shortcut"] = finest_wave(found["size"], found["shape"], found["anisotropy"])
-    return [face["generate"], found]
+    stated = _stated(recipe, split(face, *arguments(recipe))[0])
+    if recipe is self_affine and stated["shortcut"] is None:
+        stated["shortcut"] = finest_wave(stated["size"], stated["shape"], stated["anisotropy"])
+    return [face["generate"], stated]
 
 
 def _steps(face: Mapping[str, Any], names: Sequence[str] | Mapping[str, Any]) -> dict[str, Any]:
     """Return all arguments of each step that is applied."""
-    found = {}
+    applied = {}
     for name in names:
         value = face.get(name, False)
         step = STEPS[name]
         if value is not False:
             table = value if isinstance(value, Mapping) else {} if value is True else {step.argument: value}
-            found[name] = _stated(step.function, table, 1)
-    return found
+            applied[name] = _stated(step.function, table, 1)
+    return applied
 
 
 def _stated(function: Callable[..., Any], table: Mapping[str, Any], first: int = 0) -> dict[str, Any]:
     """Return the arguments of a function with its defaults; a pair for a number that counts for x and y."""
-    found = {}
+    stated = {}
     for name, (_, default) in arguments(function, first).items():
         value = table.get(name, None if default is Parameter.empty else default)
-        found[name] = [value, value] if name in _PAIRS and isinstance(value, int | float) else value
-    return found
+        stated[name] = [value, value] if name in _PAIRS and isinstance(value, int | float) else value
+    return stated
 
 
 # ------------------------------------------------------------------------------------------------- body and experiment
@@ -179,7 +179,11 @@ def _is_converted(material: Prony | Creep) -> bool:
 def _plain(value: Any) -> Any:
     """Return a frozen value as lists of numbers and texts."""
     if is_dataclass(value) and not isinstance(value, type):
-        parts = {one.name: getattr(value, one.name) for one in fields(value) if one.compare or one.name == "stands_for"}
+        parts = {
+            attribute.name: getattr(value, attribute.name)
+            for attribute in fields(value)
+            if attribute.compare or attribute.name == "stands_for"
+        }
         return [type(value).__name__, {name: _plain(part) for name, part in parts.items()}]
     if isinstance(value, Mapping):
         return {name: _plain(part) for name, part in value.items()}
@@ -225,9 +229,9 @@ def area_of(surface: Mapping[str, Any], heights: xr.DataArray | None = None) -> 
 
 def settings_identity(settings: Settings) -> dict[str, Any]:
     """Return the settings without defaults, and the fields in alphabetic order, each once."""
-    found: dict[str, Any] = {"fields": sorted(set(settings.fields))}
-    for one in fields(settings):
-        value = attraction(settings) if one.name == "adhesion" else getattr(settings, one.name)
-        if one.name != "fields" and value != one.default:
-            found[one.name] = _plain(value)
-    return found
+    stated: dict[str, Any] = {"fields": sorted(set(settings.fields))}
+    for setting in fields(settings):
+        value = attraction(settings) if setting.name == "adhesion" else getattr(settings, setting.name)
+        if setting.name != "fields" and value != setting.default:
+            stated[setting.name] = _plain(value)
+    return stated

@@ -105,11 +105,11 @@ def read_history(
     found, lines = read_table(path, {"time": Wanted(time, "s"), control: Wanted(column, unit)})
     measured = found["time"]
     start = float(measured[0])
-    for at in np.flatnonzero(np.diff(measured) < 0)[:1] + 1:
-        told = f"time {measured[at]:g} s after {measured[at - 1]:g} s"
-        raise InputError(f"{path}, line {lines[at]}: {told}: expected increasing times")
-    for at in np.flatnonzero(measured[2:] == measured[:-2])[:1]:
-        told = f"lines {lines[at]} to {lines[at + 2]}: three rows at {measured[at]:g} s"
+    for row in np.flatnonzero(np.diff(measured) < 0)[:1] + 1:
+        told = f"time {measured[row]:g} s after {measured[row - 1]:g} s"
+        raise InputError(f"{path}, line {lines[row]}: {told}: expected increasing times")
+    for row in np.flatnonzero(measured[2:] == measured[:-2])[:1]:
+        told = f"lines {lines[row]} to {lines[row + 2]}: three rows at {measured[row]:g} s"
         raise InputError(f"{path}, {told}: expected at most two, which are a jump; export more digits")
     times = _less(measured, start)
     values = _less(found[control], offset) * scale

@@ -166,9 +166,9 @@ def _arguments(model: str, table: Mapping[str, Any], export: Export) -> dict[str
     columns = dict(export.columns)
     if "tan_delta" in columns:
         columns["loss"] = columns["storage"] * columns.pop("tan_delta")
-    found = {COLUMNS[model][key][0]: values.tolist() for key, values in columns.items()}
+    arguments = {COLUMNS[model][key][0]: values.tolist() for key, values in columns.items()}
     if "frequency" in export.units:
-        found["frequency_unit"] = export.units["frequency"]
+        arguments["frequency_unit"] = export.units["frequency"]
     if export.note:
-        found["note"] = export.note
-    return {**table, **found}
+        arguments["note"] = export.note
+    return {**table, **arguments}

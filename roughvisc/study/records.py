@@ -324,10 +324,10 @@ def fit_material(
     times = rows.terms() if terms is None else listed(terms, "s", "terms")
     shortest = known.time[is_known][0]
     longest = 3 * known.time[is_known][-1]
-    for i, one in enumerate(() if terms is None else times):
-        if not shortest <= one <= longest:
+    for i, time in enumerate(() if terms is None else times):
+        if not shortest <= time <= longest:
             expected = f"a relaxation time that the record determines, from {shortest:.3g} to {longest:.3g} s"
-            raise InputError(key=f"terms.{i}", found=float(one), expected=expected)
+            raise InputError(key=f"terms.{i}", found=float(time), expected=expected)
     columns, target = (
         (rows.creep_columns(times), rows.power(contact)) if is_creep else (rows.columns(contact, times), rows.force)
     )
@@ -389,8 +389,8 @@ def _rows(record: xr.Dataset, factor: float, exponent: float) -> tuple[Indentati
             key="record", found=f"depths with a noise of {noise:.2g} of the largest depth", expected=expected
         )
     is_held = loading["segment"].values == "hold"
-    held = [np.ptp(column[is_held]) / np.ptp(column) if is_held.any() else 1.0 for column in columns[1:]]
-    return rows, bool(held[0] < held[1])
+    share_in_hold = [np.ptp(column[is_held]) / np.ptp(column) if is_held.any() else 1.0 for column in columns[1:]]
+    return rows, bool(share_in_hold[0] < share_in_hold[1])
 
 
 def _found_contact(rows: Indentation) -> float:

@@ -138,8 +138,8 @@ def in_si(value: Any, key: str, tables: Mapping[str, Any], folder: Path | None =
         return str(path)
     if isinstance(value, Mapping | list | tuple):
         parts = dict(value if isinstance(value, Mapping) else enumerate(value))
-        for name, part in parts.items():
-            parts[name] = in_si(part, f"{key}.{name}" if key else name, tables, folder)
+        for name, inner in parts.items():
+            parts[name] = in_si(inner, f"{key}.{name}" if key else name, tables, folder)
         return parts if isinstance(value, Mapping) else list(parts.values())
     if isinstance(value, bool) or value is None:
         return value
@@ -339,7 +339,7 @@ def material_of(table: Mapping[str, Any], where: str = "material") -> Material:
     scaling, own = split(own, "model", "modulus_factor")
     if model == "pair":
         parts = split(own, "a", "b")[0]
-        own |= {key: material_of(a_table(f"{where}.{key}", one), f"{where}.{key}") for key, one in parts.items()}
+        own |= {key: material_of(a_table(f"{where}.{key}", inner), f"{where}.{key}") for key, inner in parts.items()}
     material = call(MODELS[model], where, own)
     factor = shift_factor(stated, where)
     if "temperature" in stated:

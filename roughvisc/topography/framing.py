@@ -62,16 +62,16 @@ def crop(
                 raise InputError(key=axis, found=limits, expected="a pair (low, high) [m], the lower limit first")
     h = checked(h, "crop")
     off = {axis: _ON_BORDER * side for axis, side in zip(("x", "y"), spacing(h), strict=True)}
-    part = h.sel({axis: slice(low - off[axis], high + off[axis]) for axis, (low, high) in chosen.items()})
+    cropped = h.sel({axis: slice(low - off[axis], high + off[axis]) for axis, (low, high) in chosen.items()})
     for axis, limits in chosen.items():
-        if part.sizes[axis] < 2:
+        if cropped.sizes[axis] < 2:
             first, last = (format_quantity(float(h[axis][end]), "m") for end in (0, -1))
             raise InputError(
                 key=axis, found=limits, expected=f"limits that hold at least two cells of {first} to {last}"
             )
-    nx, ny = part.shape
+    nx, ny = cropped.shape
     line = f"cropped to {nx} x {ny} cells: x {chosen.get('x', 'all')}, y {chosen.get('y', 'all')} m"
-    return noted(part, line, **({} if part.shape == h.shape else {"period": None}))
+    return noted(cropped, line, **({} if cropped.shape == h.shape else {"period": None}))
 
 
 def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:

@@ -74,7 +74,7 @@ def plain_heights(heights: Any) -> xr.DataArray:
         if isinstance(value, str | Number) and not isinstance(value, bool | complex):
             plain[name] = value
         elif isinstance(value, list | tuple | np.ndarray) and np.asarray(value).dtype.kind in "fiu":
-            plain[name] = [float(one) for one in np.ravel(value)]
+            plain[name] = [float(number) for number in np.ravel(value)]
     h.attrs = plain
     return h
 

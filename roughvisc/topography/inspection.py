@@ -51,7 +51,7 @@ _OF_GAPS = 1.5
 
 
 @dataclass(frozen=True)
-class InspectedProperty:
+class Property:
     """One property of a scan.
 
     Attributes
@@ -78,7 +78,7 @@ class Inspection:
 
     Attributes
     ----------
-    findings : dict of str to InspectedProperty
+    findings : dict of str to Property
         By the names of the properties.
     steps : dict
         Conditioning steps of all findings, in order.
@@ -88,7 +88,7 @@ class Inspection:
         Of the surface after the steps. [m2, -]
     """
 
-    findings: dict[str, InspectedProperty]
+    findings: dict[str, Property]
     steps: dict[str, Any]
     boundary: Literal["periodic", "mirror"]
     area: float
@@ -128,33 +128,33 @@ def inspect(h: xr.DataArray) -> xr.Dataset:
     >>> found.finding.sel(property="Missing points").item()
     '0 (0 %)'
     """
-    found = inspection_of(h)
+    inspection = inspection_of(h)
     columns = {
-        "finding": [one.seen for one in found.findings.values()],
-        "advice": [one.advice for one in found.findings.values()],
-        "step": [json.dumps(one.step) if one.step else "" for one in found.findings.values()],
+        "finding": [finding.seen for finding in inspection.findings.values()],
+        "advice": [finding.advice for finding in inspection.findings.values()],
+        "step": [json.dumps(finding.step) if finding.step else "" for finding in inspection.findings.values()],
     }
     variables: dict[str, Any] = {name: ("property", values) for name, values in columns.items()}
-    variables["area"] = ((), found.area, {"units": "m^2", "long_name": "area after the steps"})
-    variables["rms_slope"] = ((), found.rms_slope, {"units": "1", "long_name": "rms slope after the steps"})
-    attributes = {"steps": json.dumps(found.steps), "boundary": found.boundary}
-    return xr.Dataset(variables, {"property": list(found.findings)}, attributes)
+    variables["area"] = ((), inspection.area, {"units": "m^2", "long_name": "area after the steps"})
+    variables["rms_slope"] = ((), inspection.rms_slope, {"units": "1", "long_name": "rms slope after the steps"})
+    attributes = {"steps": json.dumps(inspection.steps), "boundary": inspection.boundary}
+    return xr.Dataset(variables, {"property": list(inspection.findings)}, attributes)
 
 
 def inspection_of(h: xr.DataArray) -> Inspection:
     """Return the findings in a scan; see :func:`inspect`."""
     h = checked(h, "inspect")
-    findings: dict[str, InspectedProperty] = {}
+    findings: dict[str, Property] = {}
     missing = int(h.isnull().sum())
     holes = in_large_holes(np.isnan(h.values))
     seen = f"{missing} ({_percent(missing / h.size)})"
     advices = list[str]()
     step = dict[str, Any]()
     has_holes = bool(holes.mean() > _HOLES)
-    if has_holes and (part := _clear_part(h, holes)):
-        h = crop(h, x=part.get("x"), y=part.get("y"))
-        step["crop"] = part
-        limits = [f"{axis} from {_length(low)} to {_length(high)}" for axis, (low, high) in part.items()]
+    if has_holes and (clear_part := _clear_part(h, holes)):
+        h = crop(h, x=clear_part.get("x"), y=clear_part.get("y"))
+        step["crop"] = clear_part
+        limits = [f"{axis} from {_length(low)} to {_length(high)}" for axis, (low, high) in clear_part.items()]
         advices.append(f"crop to the largest part without these holes, {' and '.join(limits)}")
     if gaps := int(h.isnull().sum()):
         step["fill"] = True
@@ -162,7 +162,7 @@ def inspection_of(h: xr.DataArray) -> Inspection:
     if has_holes:
         seen += f", {_percent(holes.mean())} of the scan in holes wider than a few points"
         advices.append('if there is no material in the holes, missing = "absent" instead')
-    findings["Missing points"] = InspectedProperty(seen, "; ".join(advices), step, {"points": missing})
+    findings["Missing points"] = Property(seen, "; ".join(advices), step, {"points": missing})
 
     levelled = level(h)
     masked = mask_outliers(levelled)
@@ -176,7 +176,7 @@ def inspection_of(h: xr.DataArray) -> Inspection:
         seen += f": Sq is {_length(rms_levelled)} with and {_length(rms)} without them"
         advice = "outliers = true; otherwise the spikes carry the load"
     step = {"outliers": True, "fill": True} if few else {}
-    findings["Spikes"] = InspectedProperty(seen, advice, step, {"points": spikes, "rms_with": rms_levelled, "rms_without": rms})
+    findings["Spikes"] = Property(seen, advice, step, {"points": spikes, "rms_with": rms_levelled, "rms_without": rms})
 
     plane = h - levelled
     slopes = tuple(float(np.nanmean(plane.diff(axis))) / d for axis, d in zip("xy", spacing(h), strict=True))
@@ -190,20 +190,20 @@ def inspection_of(h: xr.DataArray) -> Inspection:
     with_form = 'level = 2 for the roughness alone; level = 1 and boundary = "free" for contact with the form'
     advice = ("", "level = 1 subtracts the plane", with_form)[order]
     values = {"slopes": slopes, "share": form, "rms_without": rms_flat}
-    findings["Tilt and form"] = InspectedProperty(seen, advice, {"level": order} if order else {}, values)
+    findings["Tilt and form"] = Property(seen, advice, {"level": order} if order else {}, values)
 
     treated = fill(treated) if treated.isnull().any() else treated
     borders = border_mismatch(treated)
     boundary: Literal["periodic", "mirror"] = "mirror" if max(borders) > JUMP else "periodic"
     seen = f"opposite borders differ {borders[0]:.2g} (x) and {borders[1]:.2g} times (y) as much as neighbouring rows"
-    findings["Borders"] = InspectedProperty(seen, f'boundary = "{boundary}"', {}, {"of_neighbours": borders})
+    findings["Borders"] = Property(seen, f'boundary = "{boundary}"', {}, {"of_neighbours": borders})
 
     findings["Noise"] = noise = _noise(treated)
     treated = gaussian_filter(treated, noise.step["filter"]) if noise.step else treated
     slope = rms_slope(treated)
     kind = "steeper" if slope > _STEEP else "flatter" if slope < _FLAT else ""
     advice = f"{kind} than almost any measured surface: check unit, spacing and height_scale" * bool(kind)
-    findings["Slope"] = InspectedProperty(f"{slope:.2g} rms after these steps", advice, {}, {"rms_slope": slope})
+    findings["Slope"] = Property(f"{slope:.2g} rms after these steps", advice, {}, {"rms_slope": slope})
 
     proposed = {name: value for one in findings.values() for name, value in one.step.items()}
     steps = {name: proposed[name] for name in STEPS if name in proposed}
@@ -250,7 +250,7 @@ def _clear_part(h: xr.DataArray, holes: np.ndarray) -> dict[str, Any]:
     return limits if largest[0] * side**2 >= _LEAST_PART * h.size else {}
 
 
-def _noise(h: xr.DataArray) -> InspectedProperty:
+def _noise(h: xr.DataArray) -> Property:
     """Measure the short-wave end of the spectrum, unless too few points were measured or the surface is flat.
 
     Filled points raise this end of the spectrum. Noise of 2 % of the rms height is overestimated by up to a third if
@@ -258,7 +258,7 @@ def _noise(h: xr.DataArray) -> InspectedProperty:
 
     Returns
     -------
-    InspectedProperty
+    Property
         Its values: ``rms``, the rms height of white noise as strong as the spectrum at its short-wave end [m];
         ``floor``, whether the spectrum is flat there, so that `rms` is the noise and not an upper bound; with a floor
         ``wavelength``, the shortest wave above the noise [m], and ``noisy_slopes``, the share of the shorter waves in
@@ -271,7 +271,7 @@ def _noise(h: xr.DataArray) -> InspectedProperty:
     cell = max(spacing(h))
     if min(h.shape) < 16 or gaps.mean() > _MOST_MISSING or not rms > 1e-12 * np.abs(h.values).max():
         seen = "not known: the scan is flat, smaller than 16 points, or has too many missing points"
-        return InspectedProperty(seen, "", {}, {})
+        return Property(seen, "", {}, {})
     spectrum = _spectrum(h, gaps)
     waves = _complete(spectrum, h)
     q = waves["wavevector"].values
@@ -288,7 +288,7 @@ def _noise(h: xr.DataArray) -> InspectedProperty:
     if not floor:
         least = math.sqrt(float(np.median(density[q > 0.8 * q[-1]])) / area)
         seen = f"no noise floor down to two cells; noise is below {_length(least)} rms"
-        return InspectedProperty(seen, "", {}, {"rms": least, "floor": False})
+        return Property(seen, "", {}, {"rms": least, "floor": False})
     noise = math.sqrt(tail / area)
     cutoff = float(2 * np.pi / q[below[0] - 1])
     every = spectrum["wavevector"].values
@@ -299,7 +299,7 @@ def _noise(h: xr.DataArray) -> InspectedProperty:
     step = {"filter": max(float(f"{cutoff:.2g}"), _rounded_up(3 * cell))} if is_harmful else {}
     values = {"rms": noise, "floor": True, "wavelength": cutoff, "noisy_slopes": noisy}
     advice = f'filter = "{written_quantity(step["filter"], "m")}" takes out these wavelengths' if is_harmful else ""
-    return InspectedProperty(seen, advice, step, values)
+    return Property(seen, advice, step, values)
 
 
 def _spectrum(h: xr.DataArray, gaps: np.ndarray) -> xr.Dataset:

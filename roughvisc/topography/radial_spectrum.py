@@ -261,8 +261,8 @@ def _mismatch(columns: Sequence[tuple[Array, Array]]) -> float:
         for other, others in columns[place + 1 :]:
             if (low := max(q[0], other[0])) < (high := min(q[-1], other[-1])):
                 common = np.log(np.geomspace(low, high, 32)[1:-1])
-                one = np.interp(common, np.log(q), np.log(density))
-                worst = max(worst, abs(float(np.mean(np.interp(common, np.log(other), np.log(others)) - one))))
+                first = np.interp(common, np.log(q), np.log(density))
+                worst = max(worst, abs(float(np.mean(np.interp(common, np.log(other), np.log(others)) - first))))
     return math.exp(worst)
 
 

@@ -114,7 +114,9 @@ def _labelled(file: ScanFile, channel: Channel, given: Mapping[str, Any]) -> xr.
         x, y = channel.positions
         h = with_coordinates(values, x * xy, y * xy)
     if isinstance(raw, xr.DataArray):  # keep further attributes and coordinates of a grid file
-        h = h.assign_coords({name: (("x", "y"), one.values) for name, one in raw.coords.items() if one.ndim == 2})
+        h = h.assign_coords(
+            {name: (("x", "y"), coordinate.values) for name, coordinate in raw.coords.items() if coordinate.ndim == 2}
+        )
         h.attrs |= {key: value for key, value in raw.attrs.items() if key not in ("units", "long_name")}
     h = h.isel({axis: slice(None, None, -1) for axis in ("x", "y") if h[axis][0] > h[axis][-1]})
     h = checked(h, "an areal scan")
@@ -164,7 +166,9 @@ def _units(unit: str | Sequence[str] | None) -> tuple[str | None, str | None]:
     if unit is None:
         return None, None
     parts = unit.split(",") if isinstance(unit, str) else unit if isinstance(unit, list | tuple) else ()
-    if not 0 < len(parts) <= 2 or not all(isinstance(one, str) and one.strip() for one in parts):
+    if not 0 < len(parts) <= 2 or not all(
+        isinstance(part_of_unit, str) and part_of_unit.strip() for part_of_unit in parts
+    ):
         expected = 'a unit of length, or those of x and y and of heights, such as "mm,um"'
         raise InputError(key="unit", found=unit, expected=expected)
     return parts[0].strip(), parts[-1].strip()
@@ -174,17 +178,19 @@ def _without_no_data(values: np.ndarray, no_data: float | None, complaints: list
     """Return heights with NaN at missing points, which a given number or an outlying number marks."""
     if no_data is not None:
         return np.where(np.isclose(values, number(no_data, "1", "no_data"), rtol=1e-6, atol=0.0), np.nan, values)
-    extremes = [one for one in {float(np.nanmin(values)), float(np.nanmax(values))} if abs(one) >= _NO_DATA]
-    extremes = sorted(one for one in extremes if np.count_nonzero(values == one) >= _REPEATED)
+    extremes = [extreme for extreme in {float(np.nanmin(values)), float(np.nanmax(values))} if abs(extreme) >= _NO_DATA]
+    extremes = sorted(extreme for extreme in extremes if np.count_nonzero(values == extreme) >= _REPEATED)
     rest = values[np.isfinite(values) & ~np.isin(values, extremes)]
     spread = float(np.ptp(rest)) if rest.size >= _FEWEST else 0.0
-    for one in extremes if spread > 0 else ():
-        if np.abs(rest - one).min() > (1.0 if abs(one) in _MARKS else _FAR) * spread:
-            here = values == one
+    for extreme in extremes if spread > 0 else ():
+        if np.abs(rest - extreme).min() > (1.0 if abs(extreme) in _MARKS else _FAR) * spread:
+            here = values == extreme
             values = np.where(here, np.nan, values)
             others = f"all others lie within {rest.min():g} to {rest.max():g}"
-            remedy = f"no_data = {one:g} confirms this, any other number keeps these heights"
-            complaints.append(f"{here.sum()} points have the height {one:g} and {others}: taken as missing; {remedy}")
+            remedy = f"no_data = {extreme:g} confirms this, any other number keeps these heights"
+            complaints.append(
+                f"{here.sum()} points have the height {extreme:g} and {others}: taken as missing; {remedy}"
+            )
     return values
 
 
@@ -321,12 +327,12 @@ def laid_out(
         if empty := int(np.isnan(heights).sum()):
             complaints.append(f"{empty} of {heights.size} cells of the grid hold no point")
         return heights, (side, side)
-    if (found := lattice_of(points)) is None:
+    if (lattice := lattice_of(points)) is None:
         side = float(f"{2 * metres * math.sqrt(spread[0] * spread[1] / len(points)):.1g}")
         proposed = f'grid = "{format_quantity(side, "m").replace("µ", "u")}"'
         text = f"its {len(points)} points lie on no regular lattice: expected {proposed}, or similar"
         raise InputError(text, key="grid", expected="the side of the cells into which the points are sorted")
-    return found
+    return lattice
 
 
 def meshed(corners: np.ndarray, side: float, complaints: list[str]) -> np.ndarray:
@@ -367,20 +373,20 @@ def lattice_of(points: np.ndarray) -> tuple[np.ndarray, tuple[float, float]] | N
     steps : tuple of float
         Along x and y, in the unit of the points.
     """
-    at = points[:, :2]
+    places = points[:, :2]
     nodes = np.empty((len(points), 2))
     for axis in (0, 1):
-        ordered = np.sort(at[:, axis])
+        ordered = np.sort(places[:, axis])
         gaps = np.diff(ordered)
         starts = np.append(0, np.flatnonzero(gaps > _WITHIN * gaps.max()) + 1)
         lines = np.add.reduceat(ordered, starts) / np.diff(np.append(starts, ordered.size))
         between = np.diff(lines)
         step = (lines[-1] - lines[0]) / np.round(between / np.median(between)).sum()
-        nodes[:, axis] = np.round((at[:, axis] - lines[0]) / step)
+        nodes[:, axis] = np.round((places[:, axis] - lines[0]) / step)
     centred = np.column_stack([np.ones(len(points)), nodes - nodes.mean(axis=0)])
-    fit = np.linalg.lstsq(centred, at, rcond=None)[0]
+    fit = np.linalg.lstsq(centred, places, rcond=None)[0]
     steps = np.array([fit[1, 0], fit[2, 1]])
-    off = np.vstack([at - centred @ fit, [fit[1, 1], fit[2, 0]]])
+    off = np.vstack([places - centred @ fit, [fit[1, 1], fit[2, 0]]])
     if (np.abs(off) > _OFF * steps).any():
         return None
     i, j = (nodes - nodes.min(axis=0)).astype(int).T

@@ -444,8 +444,8 @@ def indenter_of(h: xr.DataArray) -> tuple[Callable[..., np.ndarray], tuple[float
     except (KeyError, TypeError, ValueError, IndexError, ZeroDivisionError, AttributeError):
         return None
     for axis, side in zip("xy", cell, strict=True):
-        at = h[axis].values / side - 0.5
-        if np.abs(at - round(at[0]) - np.arange(at.size)).max() > 1e-6:
+        place = h[axis].values / side - 0.5
+        if np.abs(place - round(place[0]) - np.arange(place.size)).max() > 1e-6:
             return None
     near = 1e-9 * np.nanmax(np.abs(expected), initial=0.0)
     if not np.allclose(h.transpose("x", "y").values, expected, rtol=0, atol=near, equal_nan=True):
@@ -542,8 +542,8 @@ def surrogates(h: xr.DataArray, count: int, *, seed: int) -> xr.DataArray:
     3
     """
     numbers = range(1, whole("count", count, 1) + 1)
-    found = [surrogate(h, number, seed=seed) for number in numbers]
-    return xr.concat(found, xr.DataArray(np.array(numbers), dims="realisation", name="realisation"))
+    surfaces = [surrogate(h, number, seed=seed) for number in numbers]
+    return xr.concat(surfaces, xr.DataArray(np.array(numbers), dims="realisation", name="realisation"))
 
 
 def surrogate(h: xr.DataArray, number: int, *, seed: int = 0) -> xr.DataArray:
@@ -590,18 +590,18 @@ def random_heights(amplitude: np.ndarray, ny: int, entropy: list[int], *, normal
     ndarray, shape (nx, ny)
         Heights. [m]
     """
-    nx, held = amplitude.shape
-    centres = np.exp(1j * np.pi * np.arange(held) / ny)  # from the corner to the first centre, half a cell
-    spectrum = np.zeros((nx, held), dtype=complex)
-    for row, part in enumerate(amplitude):
-        count = int(np.flatnonzero(part).max(initial=-1)) + 1
+    nx, drawn = amplitude.shape
+    centres = np.exp(1j * np.pi * np.arange(drawn) / ny)  # from the corner to the first centre, half a cell
+    spectrum = np.zeros((nx, drawn), dtype=complex)
+    for row, row_of_amplitudes in enumerate(amplitude):
+        count = int(np.flatnonzero(row_of_amplitudes).max(initial=-1)) + 1
         k_x = row if 2 * row < nx else row - nx
         key = 2 * k_x if k_x >= 0 else -2 * k_x - 1
         seeds = (np.random.SeedSequence(entropy, spawn_key=(key, i)) for i in (0, 1))
         phases, powers = map(np.random.default_rng, seeds)
         waves = np.exp(2j * np.pi * phases.random(count))
         waves = waves * np.sqrt(powers.standard_exponential(count)) if normal else waves
-        spectrum[row, :count] = part[:count] * (np.exp(1j * np.pi * k_x / nx) * centres[:count]) * waves
+        spectrum[row, :count] = row_of_amplitudes[:count] * (np.exp(1j * np.pi * k_x / nx) * centres[:count]) * waves
     half = (nx - 1) // 2  # the first column holds both halves: make it Hermitian
     spectrum[nx - half :, 0] = spectrum[1 : half + 1, 0][::-1].conj()
     return scipy.fft.irfft(scipy.fft.ifft(spectrum, axis=0, norm="forward"), ny, axis=1, norm="forward")

@@ -143,8 +143,8 @@ def open_scan(
         one_key("the card", table, ("file", "generate"))
         stated = about.pop("sha256", None)
         file = table.get("file")
-        if stated and file and stated.lower() != (found := sha256(existing(file, "file"))):
-            expected = f"{found}, that of {Path(file).name}, which was changed or damaged"
+        if stated and file and stated.lower() != (checksum := sha256(existing(file, "file"))):
+            expected = f"{checksum}, that of {Path(file).name}, which was changed or damaged"
             raise InputError(key="sha256", found=stated, expected=expected)
         h = condition(raw_height("", table), split(table, *STEPS)[0])
     except InputError as error:
@@ -409,9 +409,9 @@ def written_quantity(value: float, unit: str, digits: int = 6) -> str:
 def toml_text(value: Any, digits: int | None = None) -> str:
     """Return a value as TOML; if `digits` is given, numbers are written as lengths with this many digits."""
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {toml_text(one, digits)}" for key, one in value.items()) + " }"
+        return "{ " + ", ".join(f"{key} = {toml_text(inner, digits)}" for key, inner in value.items()) + " }"
     if isinstance(value, list | tuple):
-        return f"[{', '.join(toml_text(one, digits) for one in value)}]"
+        return f"[{', '.join(toml_text(inner, digits) for inner in value)}]"
     text = value if digits is None else written_quantity(float(value), "m", digits)
     if isinstance(text, float):
         return str(text)  # inf and nan are Infinity and NaN in JSON

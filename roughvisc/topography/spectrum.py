@@ -167,13 +167,15 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
     ring = ring_numbers(q, step)
     ring[q == 0] = 0  # the mean
     count = np.broadcast_to(stands_for, q.shape)
-    counted, at, total = (np.bincount(ring.ravel(), one.ravel())[1:] for one in (count, count * q, count * density))
+    counted, mean_wave, total = (
+        np.bincount(ring.ravel(), weights.ravel())[1:] for weights in (count, count * q, count * density)
+    )
     ring = np.flatnonzero(counted)
     density_attrs = {"units": "m^4", "long_name": "power spectral density of height, radial average"}
     variables = {
         "psd": ("wavevector", total[ring] / counted[ring], density_attrs),
         "modes": ("wavevector", counted[ring].astype(int), {"units": "1", "long_name": "waves in the ring"}),
-        "wavevector": ("wavevector", at[ring] / counted[ring], {"units": "rad/m", "long_name": "wavevector"}),
+        "wavevector": ("wavevector", mean_wave[ring] / counted[ring], {"units": "rad/m", "long_name": "wavevector"}),
     }
     return xr.Dataset(variables, attrs={"area": h.size * cells[0] * cells[1]})
 

@@ -141,8 +141,8 @@ def _formats_of(path: Path) -> Sequence[str]:
         return quick
     known = supported_formats()
     wanted = "000 to 999" if len(suffix) == 3 and suffix.isdigit() else suffix
-    if found := [name for name, theirs in known.items() if wanted in theirs]:
-        return found
+    if names := [name for name, theirs in known.items() if wanted in theirs]:
+        return names
     if suffix in _EXPORTS:
         raise InputError(f"it is {_EXPORTS[suffix]}", key="format", found=path.suffix)
     listed = ", ".join(sorted({one for theirs in known.values() for one in theirs}))

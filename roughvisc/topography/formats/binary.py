@@ -75,7 +75,9 @@ def read_netcdf(path: Path) -> ScanFile:
         options: dict[str, Any] = {"engine": "scipy" if stream.read(3) == b"CDF" else "netcdf4", "decode_times": False}
     # netCDF-4 is not thread-safe, and xarray would lock only the reading
     with NETCDF4_PYTHON_LOCK, xr.open_dataset(path, lock=False, **options) as dataset:
-        channels = [_variable(str(name), one) for name, one in dataset.data_vars.items() if one.ndim >= 2]
+        channels = [
+            _variable(str(name), variable) for name, variable in dataset.data_vars.items() if variable.ndim >= 2
+        ]
     return ScanFile("nc", channels)
 
 
@@ -132,7 +134,7 @@ def read_with_surface_topography(source: Path | BytesIO | StringIO, format: str)
         raise InputError(key="format", found=format, expected="a key of supported_formats")
     reader = lookup_reader_by_format[format](str(source) if isinstance(source, Path) else source)
     default = getattr(reader, "_default_channel_index", None)
-    return ScanFile(format, [_channel(found) for found in reader.channels], default, close=reader.close)
+    return ScanFile(format, [_channel(channel) for channel in reader.channels], default, close=reader.close)
 
 
 def _channel(found: Any) -> Channel:
