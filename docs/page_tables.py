@@ -90,8 +90,8 @@ def arguments():
             if names == ("progress",) and "Progress" in str(taken.get("progress"))
         ]
         if also:
-            meaning += f"; in {', '.join(f'`{one}`' for one in also)} also a function of what is "
-            meaning += "done and of the whole"
+            meaning += f"; in {', '.join(f'`{one}`' for one in also)} also a function of the "
+            meaning += "progress and its end"
         lines.append(f"| {', '.join(f'`{one}`' for one in names)} | {meaning} | {sharing[0]} |")
     return "\n".join(lines)
 
@@ -109,7 +109,7 @@ MARK = re.compile(r'^<!-- table "(.+)" -->\n(\n\|.*(?:\n\|.*)*\n)?', re.M)
 
 
 def filled(page):
-    """Return the text of a page with its tables as the package has them now."""
+    """Return the text of a page with the present tables of the package."""
     return MARK.sub(lambda mark: f'<!-- table "{mark[1]}" -->\n\n{TABLES[mark[1]]()}\n', page)
 
 

@@ -1,6 +1,6 @@
 """Contact of measured rough surfaces with linear viscoelastic materials.
 
-``__init__.pyi`` lists the public names of ``import roughvisc as rv``, ``materials.py`` and ``surfaces.py`` those of
+``__init__.pyi`` lists the public names of ``import roughvisc as rv``, ``materials.py`` and ``surfaces.py`` the names of
 constructors. Each name is imported from its module at its first use, so that importing the package is quick.
 """
 

@@ -394,7 +394,7 @@ def read_export(path: str | Path, wanted: Mapping[str, Wanted], part: str | None
     Notes
     -----
     The heading is the first line with all names; a unit is part of a name, as ``f [Hz]``, or in one of two rows below
-    the names. Rows with an empty cell or a text in place of a number are left out, and so are repeated headings.
+    the names. Rows with an empty cell or a text instead of a number are left out, and so are repeated headings.
     """
     path = path_of(path, "path")
     try:
@@ -555,7 +555,7 @@ class _ExportTable:
                     return
 
     def _row(self, line: int, text: str) -> tuple[list[str], list[str]]:
-        """Return the cells of a line, and those of the wanted columns; missing ones are empty."""
+        """Return the cells of a line, and the cells of the wanted columns; missing ones are empty."""
         row = text.split() if self.separator in (" ", "  ") else _cells(text, self.separator)
         between_blanks = text.split()
         if len(row) == 1 < len(between_blanks) == len(self.heading):  # names between tabs above numbers between blanks

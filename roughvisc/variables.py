@@ -61,7 +61,7 @@ class Variable:
     is_panel : bool
         Whether :func:`roughvisc.plot.history` draws it by default.
     is_of_steps : bool
-        Whether a result over time has it at its accepted steps alone, in the group ``steps``.
+        Whether a result over time contains it at its accepted steps alone, in the group ``steps``.
     """
 
     dims: tuple[str, ...]
@@ -115,7 +115,7 @@ _SOLVER = "of the solution on this grid alone: without the errors of the grid an
 _BOTH = "of the grid and of the solver"
 _PERSSON = "by Persson's theory of the same waves"
 _ASPERITIES = "at the rms slope of the surface"
-_NO_ESTIMATE = "if the coarser grid has no solution, or the quantity is zero but for its error"
+_NO_ESTIMATE = "if the coarser grid has no solution, or the quantity is zero within its error"
 _ABSENT = "where the profile is absent"
 _FALLEN = "once the load has fallen"
 _CUT_OFF = "without an upper limit"
@@ -265,7 +265,10 @@ VARIABLES: dict[str, Variable] = {
         missing=_CUT_OFF,
     ),
     "friction_force_error": Variable(
-        _SERIES, "N", "stated error of the friction force", "of steps of one cell; over speed stated_error of it"
+        _SERIES,
+        "N",
+        "stated error of the friction force",
+        "of steps of one cell; over speed stated_error times friction",
     ),
     "grid_error": Variable(
         _SERIES,

@@ -145,6 +145,13 @@ def test_wrong_type__is_refused_at_the_argument(function, arguments):
             assert caught.value.key.partition("[")[0].partition(".")[0] == name, wrong
 
 
+def test_case__has_the_settings_of_simulate():
+    case, simulate = (list(inspect.signature(one).parameters.values()) for one in (rv.Case, rv.simulate))
+    own = {"surface", "program", "title", "observe", "audit"}
+    of_simulate = [one for one in simulate if one.name not in ("height", "program", "threads", "progress")]
+    assert [str(one) for one in case if one.name not in own] == [str(one) for one in of_simulate]
+
+
 SMALL = rv.Case(rv.sphere(1e-3, 2e-4, 9), rv.elastic(1e6), rv.Program().load(1e-6, over=0), title="small")
 
 

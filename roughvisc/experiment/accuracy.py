@@ -42,7 +42,7 @@ LEAST = 0.015
 #: displacement ``u`` of a contact cell lies between zero and the approach. Under a given load the integral of ``dp``
 #: vanishes, so ``u`` may count from half the approach.
 OF_WORK = {"approach": 1.0, "load": 0.5}
-#: The same of a body with memory, whose work is an integral over steps with independent errors.
+#: The same for a body with memory, whose work is an integral over steps with independent errors.
 OF_WORK_OF_STEPS = 0.2
 #: Error of the pressure at the edge of contact, over the mean error of the pressure.
 SOLVER_AT_EDGE = 3.0
@@ -107,7 +107,7 @@ def shortest_age(program: Program, settings: Settings) -> float:
 
 
 def series_of_run(material: Material, program: Program, settings: Settings) -> Prony:
-    """Return the series that a run uses in place of a creep function, with the error of the series."""
+    """Return the series that replaces a creep function in a run, with the error of the series."""
     memory = memory_of(Body(material), program, settings)
     series = memory.series
     if not memory.series_error:

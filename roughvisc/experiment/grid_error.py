@@ -108,7 +108,7 @@ _COUNTING = 0.5
 #: cell centres may be wider than one cell. At 0.999 of the pressure of full contact the hidden area is 2.3 times the
 #: open area of a wave on 64 cells, and 4.7 times the open area on 32 cells.
 _HIDDEN = 1.5
-#: Size that stands for zero in a ratio.
+#: Size that counts as zero in a ratio.
 _ZERO = 1e-300
 #: Approaches of both grids that differ by less than this part of the largest approach were prescribed.
 _GIVEN = 1e-12

@@ -51,7 +51,7 @@ from roughvisc.variables import STATUS_MEANINGS
 log = logging.getLogger("roughvisc")
 Array = NDArray[np.float64]
 
-#: Largest stated error, over the tolerance, of a step that is kept because its error is small. Such a choice favours
+#: Largest stated error, over the tolerance, of a step that is kept because its error is small. This choice favours
 #: steps whose stated error is too small. With 1 instead of 0.5, a third more steps are kept, but 9 instead of 4 % of
 #: 185 random cases have a row beyond the tolerance.
 CHOSEN = 0.5

@@ -318,7 +318,7 @@ class SlidingRows(Rows):
         """Return the steady state at a speed [m/s] and at the temperature that the heat of friction makes.
 
         Heat reduces friction exponentially. So the method of false position (Illinois) works on the logarithms of the
-        rises. The number of spots jumps where they merge: the interval may end around a jump.
+        rises. The number of spots jumps when they merge: the interval may end around a jump.
         """
         warm = self._at(speed, 0.0)
         if self._curve.heating is None or (rise := self._rise(warm, speed)) <= _SAME_TEMPERATURE:

@@ -72,7 +72,7 @@ def frame_by_frame(
     Parameters
     ----------
     function : callable
-        Returns a number or an array, or a tuple of them for several `outputs`.
+        Returns a number or an array, or a tuple for several `outputs`.
     *fields : xarray.DataArray
         Over x and y and any other dimensions.
     outputs : sequence of sequence of str

@@ -92,8 +92,8 @@ class Case:
     surface : xarray.DataArray, dims (x, y)
         Heights, as in :func:`roughvisc.simulate`. [m]
     material : Material or Body
-        Material of a half-space, or a body, as in :func:`roughvisc.simulate`. The case has the series that the run uses
-        in place of a function from :func:`roughvisc.creep`.
+        Material of a half-space, or a body, as in :func:`roughvisc.simulate`. The series that a
+        run uses replaces a function from :func:`roughvisc.creep`.
     program : Program or SteadySliding
         Load, nominal pressure or approach against time, or steady sliding, with its speeds in increasing order.
     title : str
@@ -355,7 +355,7 @@ class Case:
         text : str
             The JSON.
         folder : Path, optional
-            Folder of relative paths, that of the result.
+            Folder of the result, to which paths are relative.
         """
         try:
             data = dict(json.loads(text))
@@ -484,7 +484,7 @@ def read_cases(path: str | Path) -> list[Case]:
     path : path
         A TOML file; files that it names are sought relative to it.
 
-    In a sweep over programs a case leaves out the times of ``keep.times`` after the end of its own program.
+    In a sweep over programs a case leaves out the times of ``keep.times`` after the end of its program.
 
     Returns
     -------

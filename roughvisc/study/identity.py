@@ -1,6 +1,6 @@
-"""The key of a case: a digest of what is computed, however it was written.
+"""The key of a case: a digest of the computation, independent of its notation.
 
-Defaults, units, pairs of equal numbers, cards and the model of a material do not count; the numbers that they stand for
+Defaults, units, pairs of equal numbers, cards and the model of a material do not count; the numbers behind them
 do.
 """
 

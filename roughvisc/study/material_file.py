@@ -27,7 +27,7 @@ COLUMNS: dict[str, dict[str, tuple[str, str]]] = {
 }
 for _columns in COLUMNS.values():
     _columns["temperature"] = ("temperatures", "K")
-#: Columns that are read only if their name is stated, and those that are read if the file has them.
+#: Columns that are read only if their name is stated, and columns that are read if the file contains them.
 _IF_STATED = ("temperature", "tan_delta")
 _IF_THERE = ("shift_factor",)
 #: Keys of a table that describe its file.
@@ -122,7 +122,7 @@ def with_columns(where: str, stated: Any) -> dict[str, Any]:
 
 
 def with_line(error: InputError, stated: Mapping[str, Any]) -> InputError:
-    """Return an error about the rows of a table with the file and the line in place of the table and its row."""
+    """Return an error about the rows of a table with the file and the line instead of the table and its row."""
     text = str(error)
     file = str(stated["file"])
     if matched := re.search(r"table row (\d+)", text):
@@ -162,7 +162,7 @@ def _export(description: Mapping[str, Any], table: Mapping[str, Any]) -> Export:
 
 
 def _arguments(model: str, table: Mapping[str, Any], export: Export) -> dict[str, Any]:
-    """Return a table with the columns of an export in place of its file."""
+    """Return a table with the columns of an export instead of its file."""
     columns = dict(export.columns)
     if "tan_delta" in columns:
         columns["loss"] = columns["storage"] * columns.pop("tan_delta")

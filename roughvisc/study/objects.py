@@ -165,7 +165,7 @@ def _is_stated(material: Material) -> bool:
 
 
 def _series_of(material: Creep, experiment: Experiment, settings: Settings) -> Prony:
-    """Return the series that a run uses in place of a creep function of the user's."""
+    """Return the series that replaces a creep function of the user in a run."""
     if material.function is pair_creep or not isinstance(experiment, Loading):
         expected = "materials without a function of your own, in a pair and in steady sliding; rv.simulate takes them"
         raise InputError(key="material", found=material, expected=expected)

@@ -71,7 +71,7 @@ def read_record(
     Parameters
     ----------
     path : path
-        A text export of JPK or Optics11, which need no other argument, or a table with a heading; see Notes.
+        A text export of JPK or Optics11, without any other argument, or a table with a heading; see Notes.
     time, force : str
         Names of the columns of time and force, compression positive.
     approach : str, optional

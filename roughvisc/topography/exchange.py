@@ -91,7 +91,7 @@ def to_topography(height: xr.DataArray, unit: str = "m") -> Any:
     Returns
     -------
     SurfaceTopography.Topography
-        The same heights, masked where they are missing, periodic if :func:`roughvisc.simulate` takes the boundary
+        The same heights, masked at missing points, periodic if :func:`roughvisc.simulate` takes the boundary
         ``auto`` as periodic.
 
     Raises

@@ -1,4 +1,4 @@
-"""Heights from Python in a NetCDF file that is named by the digest of what a solve uses of them."""
+"""Heights from Python in a NetCDF file that is named by the digest of their values and attributes."""
 
 from __future__ import annotations
 

@@ -26,14 +26,14 @@ Convention = Literal["psd", "persson"]
 
 #: Convention of a spectral density -> its factor to the convention of this package.
 _FACTORS = {"psd": 1.0, "persson": (2 * math.pi) ** 2}
-# Rings of a scan are averaged over bins, so many in a decade.
+# Rings of a scan are averaged over bins, with this number in a decade.
 _BINS = 40
 # Values per decade of a spectrum for integrals, and fewest values.
 _PER_DECADE = 60
 _FEWEST = 240
 # Density that counts as zero, over the largest one.
 _NOTHING = 1e-60
-# Ratio of the densities of two scans where they overlap, from which a warning is given.
+# Ratio of the densities of two overlapping scans, from which a warning is given.
 _DIFFERENT = 2.0
 
 
@@ -82,7 +82,7 @@ def psd_table(wavevectors: Sequence[Quantity], densities: Sequence[Quantity], *,
 
 
 def join_psd(*spectra: xr.Dataset | xr.DataArray) -> xr.Dataset:
-    """Join radial spectra of different ranges, such as those of scans of different resolution.
+    """Join radial spectra of different ranges, such as spectra of scans of different resolution.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ def _columns(source: Any) -> tuple[Array, Array]:
 
 
 def _checked_columns(wavevectors: ArrayLike, densities: ArrayLike) -> tuple[Array, Array]:
-    """Return two columns of a spectrum as arrays; refuse what is not one."""
+    """Return two columns of a spectrum as arrays; refuse anything else."""
     q = np.asarray(wavevectors, dtype=float)
     density = np.asarray(densities, dtype=float)
     if q.ndim != 1 or q.shape != density.shape or q.size < 2:

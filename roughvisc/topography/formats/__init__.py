@@ -51,7 +51,7 @@ _EXPORTS = {
 _GWYDDION = "not verified: the reader matches the map of Gwyddion, whose first line is the top one"
 TOP_FIRST = {
     "tmd": "verified: the letters of a coin (DIME), and the maker's own script draws the first line at the top",
-    "al3d": "verified: heights and camera image of a real file lie line by line alike, and images begin at the top",
+    "al3d": "verified: heights and camera image of a real file agree line by line, and images begin at the top",
     "esri": "verified: the definition of the format, whose first row is the top one",
     "gwy": "not verified: Gwyddion's own format, whose first line is the top one",
     "opd": "not verified: two programs draw the same line at the top",

@@ -34,7 +34,7 @@ def read_stl(path: Path) -> ScanFile:
         vertices = _VERTEX.findall(content)
         if not content.lstrip().startswith(b"solid") or len(vertices) % 3 or b"endsolid" not in content:
             raise InputError(
-                "it is no whole STL file: expected a binary or a text STL file", key="format", found=path.suffix
+                "it is not a complete STL file: expected a binary or a text STL file", key="format", found=path.suffix
             )
         corners = np.array(vertices, dtype=float).reshape(-1, 3, 3)
     return _mesh("stl", corners)
