@@ -5,7 +5,6 @@ A scene holds surface, contact and bodies of a result. Each check returns the si
 
 from __future__ import annotations
 
-import inspect
 import json
 import math
 import textwrap
@@ -582,12 +581,19 @@ def audit(
     >>> found.verdict.sel(assumption=["adhesion", "slope", "yielding"]).values.tolist()
     ['broken', 'holds', 'not known']
     """
-    given = dict(locals())
-    named = {name: given[name] for name in inspect.signature(properties).parameters}
+    stated = {
+        "work_of_adhesion": work_of_adhesion,
+        "yield_strength": yield_strength,
+        "thickness": thickness,
+        "base": base,
+        "density": density,
+        "heat_conductivity": heat_conductivity,
+        "volumetric_heat_capacity": volumetric_heat_capacity,
+    }
     if not isinstance(result, xr.Dataset):
         case = case_given(result, "result")
         result = open_result(run_one(case, result_folder(case, out), progress=progress, threads=threads))
-    found = audit_of(result, **named)
+    found = audit_of(result, **stated)
     columns = {
         "verdict": ("verdict", [one.verdict for one in found]),
         "number": ("number that is compared with the limits", [one.number for one in found]),

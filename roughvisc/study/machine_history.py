@@ -102,17 +102,21 @@ def read_history(
     limit = number(thin, "1" if is_part else unit, "thin", least=0)
     offset = number(zero, unit, "zero")
     scale = number(factor, "1", "factor")
-    found, lines = read_table(path, {"time": Wanted(time, "s"), control: Wanted(column, unit)})
-    measured = found["time"]
+    columns_read, lines = read_table(path, {"time": Wanted(time, "s"), control: Wanted(column, unit)})
+    measured = columns_read["time"]
     start = float(measured[0])
-    for row in np.flatnonzero(np.diff(measured) < 0)[:1] + 1:
-        told = f"time {measured[row]:g} s after {measured[row - 1]:g} s"
-        raise InputError(f"{path}, line {lines[row]}: {told}: expected increasing times")
-    for row in np.flatnonzero(measured[2:] == measured[:-2])[:1]:
-        told = f"lines {lines[row]} to {lines[row + 2]}: three rows at {measured[row]:g} s"
-        raise InputError(f"{path}, {told}: expected at most two, which are a jump; export more digits")
+    falls = np.diff(measured) < 0
+    if falls.any():
+        row = falls.argmax() + 1
+        times_of_rows = f"time {measured[row]:g} s after {measured[row - 1]:g} s"
+        raise InputError(f"{path}, line {lines[row]}: {times_of_rows}: expected increasing times")
+    is_third = measured[2:] == measured[:-2]
+    if is_third.any():
+        row = is_third.argmax()
+        rows = f"lines {lines[row]} to {lines[row + 2]}: three rows at {measured[row]:g} s"
+        raise InputError(f"{path}, {rows}: expected at most two, which are a jump; export more digits")
     times = _less(measured, start)
-    values = _less(found[control], offset) * scale
+    values = _less(columns_read[control], offset) * scale
     notes = [f"{start:g} s in the file is time zero"] if start else []
     largest = float(np.max(np.abs(values)))
     lowest = float(values.min())

@@ -133,10 +133,11 @@ def read_record(
         names |= {"height": height} if approach is None else {"approach": approach}
     units = {"time": "s", "force": "N"}
     columns, lines = read_table(path, {key: Wanted(name, units.get(key, "m")) for key, name in names.items()})
-    for row in np.flatnonzero(np.diff(columns["time"]) < 0)[:1] + 1:
-        raise InputError(
-            key=f"{path}, line {lines[row]}: time", found=columns["time"][row], expected="increasing times"
-        )
+    falls = np.diff(columns["time"]) < 0
+    if falls.any():
+        row = falls.argmax() + 1
+        key = f"{path}, line {lines[row]}: time"
+        raise InputError(key=key, found=columns["time"][row], expected="increasing times")
     if columns["force"].max() <= 0:
         highest = float(columns["force"].max())
         raise InputError(key="force", found=highest, expected="a positive force, compression positive")

@@ -243,11 +243,14 @@ def _checked_columns(wavevectors: ArrayLike, densities: ArrayLike) -> tuple[Arra
     if q.ndim != 1 or q.shape != density.shape or q.size < 2:
         found = f"{q.size} wave numbers and {density.size} densities"
         raise InputError(key="densities", found=found, expected="one for each wave number, at least two")
-    for row in np.flatnonzero(~(np.isfinite(q) & (q > 0)) | (np.diff(q, prepend=0.0) <= 0))[:1]:
-        raise InputError(
-            key=f"wavevectors[{row}]", found=q[row], expected="a positive number above the last one [rad/m]"
-        )
-    for row in np.flatnonzero(~(np.isfinite(density) & (density >= 0)))[:1]:
+    is_wrong = ~(np.isfinite(q) & (q > 0)) | (np.diff(q, prepend=0.0) <= 0)
+    if is_wrong.any():
+        row = is_wrong.argmax()
+        expected = "a positive number above the last one [rad/m]"
+        raise InputError(key=f"wavevectors[{row}]", found=q[row], expected=expected)
+    is_wrong = ~(np.isfinite(density) & (density >= 0))
+    if is_wrong.any():
+        row = is_wrong.argmax()
         raise InputError(key=f"densities[{row}]", found=float(density[row]), expected="a number, not negative [m4]")
     if not density.any():
         raise InputError(key="densities", found=0.0, expected="a positive density [m4]")
