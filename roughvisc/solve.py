@@ -235,8 +235,8 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     coordinates = {axis: columns.pop(axis), "x": height["x"].values, "y": height["y"].values}
     variables |= columns
     for name in settings.fields:
-        found = recorder.field(name, numbers, (height.shape[0], height.shape[1]))
-        variables[name] = (axis, "x", "y"), found
+        frames = recorder.field(name, numbers, (height.shape[0], height.shape[1]))
+        variables[name] = (axis, "x", "y"), frames
     if "filled" in height.coords:
         variables["filled"] = ("x", "y"), height["filled"].values
     made = {

@@ -167,21 +167,24 @@ def read_table(path: str | Path, wanted: Mapping[str, Wanted]) -> tuple[dict[str
     path = path_of(path, "path")
     separator, rows = _rows(path)
     needed = [one.name for one in wanted.values() if not one.optional]
-    headings = (at for at, (_, cells) in enumerate(rows[:_FIRST]) if all(_places(cells, name) for name in needed))
+    headings = (place for place, (_, cells) in enumerate(rows[:_FIRST]) if all(_places(cells, name) for name in needed))
     if (above := next(headings, None)) is None:
         raise _no_heading(path, rows, separator, wanted)
     line, heading = rows[above]
     below = rows[above + 1 :]
     if not below:
         raise InputError(f"{path}: holds no rows below the heading in line {line}: expected {', '.join(wanted)}")
-    places = {key: found for key, one in wanted.items() if (found := _places(heading, one.name))}
+    places = {key: places_of_name for key, one in wanted.items() if (places_of_name := _places(heading, one.name))}
     converted = {
-        key: _conversion(path, line, [heading[at] for at in found], key, wanted[key]) for key, found in places.items()
+        key: _conversion(path, line, [heading[place] for place in places_of_name], key, wanted[key])
+        for key, places_of_name in places.items()
     }
     for row, cells in below:
         if any(cells[len(heading) :]) or (separator == " " and len(cells) != len(heading)):
             raise InputError(f"{path}, line {row}: found {len(cells)} cells: expected {len(heading)}, as above")
-    texts = {key: [cells[at] if at < len(cells) else "" for _, cells in below] for key, (at, *_) in places.items()}
+    texts = {
+        key: [cells[place] if place < len(cells) else "" for _, cells in below] for key, (place, *_) in places.items()
+    }
     try:
         mark = decimal_mark((cell for column in texts.values() for cell in column), separator)
     except InputError as error:
@@ -303,10 +306,10 @@ def _conversion(path: Path, line: int, names: Sequence[str], key: str, one: Want
         raise InputError(f"{where}: unit of {key}: {problem}: expected one unit")
     unit = given or stated
     if not unit:
-        found = names[0]
+        heading = names[0]
         expected = _example(names[0], one.unit)
-        message = f"{where}: found the column {found!r} without a unit: expected a heading, {expected!r}"
-        raise InputError(message, found=found, expected=expected)
+        message = f"{where}: found the column {heading!r} without a unit: expected a heading, {expected!r}"
+        raise InputError(message, found=heading, expected=expected)
     try:
         factor, zero = (1.0, 0.0) if unit == one.unit else (number(f"{n} {unit}", one.unit) for n in (1, 0))
     except InputError as error:
@@ -485,14 +488,18 @@ def _export_heading(
                     best = line, missing, text
                 if missing:
                     continue
-                positions = {key: found for key, column in wanted.items() if (found := _places(heading, column.name))}
-                for key, found in positions.items():
-                    if len(found) > 1:
-                        names = ", ".join(heading[place] for place in found)
+                positions = {
+                    key: places_of_name
+                    for key, column in wanted.items()
+                    if (places_of_name := _places(heading, column.name))
+                }
+                for key, places_of_name in positions.items():
+                    if len(places_of_name) > 1:
+                        names = ", ".join(heading[place] for place in places_of_name)
                         raise InputError(
                             f"{path}, line {line}: {key} = {wanted[key].name!r} fits the columns {names}: expected one"
                         )
-                return above, separator, heading, {key: found[0] for key, found in positions.items()}
+                return above, separator, heading, {key: places_of_name[0] for key, places_of_name in positions.items()}
     expected = f"a line with the names {', '.join(map(repr, needed))}"
     absent = f"found no {best[1][0]!r} in line {best[0]}, {best[2][:100]!r}" if best[1] else "found no such line"
     raise InputError(f"{path}: {absent}: expected {expected}", found=absent, expected=expected)

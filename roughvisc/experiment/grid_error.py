@@ -258,8 +258,12 @@ def _least_errors(
     # The peak: under a given approach the gap is too wide by its height. Force and area grow with the square of the
     # approach under a cone, and with lower powers under a ball. Under a given load the approach is too small.
     depth = abs(here["approach"])
-    part = 2 * peak / max(depth, peak or 1.0) if given and depth > 0 else 0.0
-    least = {"pressure": part * force, "force": part * force, "contact_area": part * area}
+    share_of_approach = 2 * peak / max(depth, peak or 1.0) if given and depth > 0 else 0.0
+    least = {
+        "pressure": share_of_approach * force,
+        "force": share_of_approach * force,
+        "contact_area": share_of_approach * area,
+    }
     least |= {"approach": 0.0 if given else peak / largest["approach"], "mean_gap": peak / wide if given else 0.0}
 
     pressure = dataset["pressure"].values[row]

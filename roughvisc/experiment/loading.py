@@ -498,9 +498,9 @@ def on_device(value: Any, xp: Any) -> Any:
     if isinstance(value, np.ndarray):
         return xp.asarray(value)
     if isinstance(value, tuple):
-        return tuple(on_device(part, xp) for part in value)
+        return tuple(on_device(inner, xp) for inner in value)
     if isinstance(value, STATES):
-        return replace(value, **{part.name: on_device(getattr(value, part.name), xp) for part in fields(value)})
+        return replace(value, **{field.name: on_device(getattr(value, field.name), xp) for field in fields(value)})
     return value
 
 

@@ -309,13 +309,13 @@ def estimated(profile: Profile, compliance: float, program: Program) -> Estimate
         pushes.append({"load": program.largest_load * compliance / grid.cell_area})
     for push in pushes:
         try:
-            found = solve_contact(
+            contact = solve_contact(
                 grid, np.ascontiguousarray(gap), tolerance=ESTIMATE_TOLERANCE, present=present, **push
             )
         except ConvergenceError:
             return Estimate()
-        approach = max(approach, found.approach)
-        touches |= found.pressure > 0
+        approach = max(approach, contact.approach)
+        touches |= contact.pressure > 0
     if not touches.any():
         return Estimate(approach)
     places = np.argwhere(touches)

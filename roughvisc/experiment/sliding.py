@@ -270,16 +270,16 @@ class SlidingRows(Rows):
             states = []
             runs = []
             for cells in self._grids:
-                found = warm.state
+                state = warm.state
                 sliding = warm.sliding
                 if cells is not self._grids[0]:
-                    found, sliding = self._steady(cells, warm.law, speed, warm.seen)
-                pressure = to_host(found.pressure)
-                contact = to_host(found.pressure) > 0
-                gap = np.where(contact, 0.0, np.maximum(cells.gap + to_host(found.displacement) - found.approach, 0.0))
+                    state, sliding = self._steady(cells, warm.law, speed, warm.seen)
+                pressure = to_host(state.pressure)
+                contact = to_host(state.pressure) > 0
+                gap = np.where(contact, 0.0, np.maximum(cells.gap + to_host(state.displacement) - state.approach, 0.0))
                 counted, area, _ = contact_area(contact, ~contact, math.prod(cells.spacing), "periodic")
-                states.append((found, sliding, pressure, gap, counted, area))
-                runs.append((found.power_force, area, found.approach, float(gap.mean())))
+                states.append((state, sliding, pressure, gap, counted, area))
+                runs.append((state.power_force, area, state.approach, float(gap.mean())))
             row, fields = self._row(*states[0])  # on the grid of the surface
             pressure = states[0][2]
             creep = 0.0

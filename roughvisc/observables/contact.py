@@ -269,8 +269,8 @@ def leakage(
         "transmissivity": transmissivity,
         "hydraulic_aperture": (12 * transmissivity) ** (1 / 3),
     }
-    for axis, one in zip((along, across), fields, strict=False):
-        variables[f"flux_{axis}"] = (one * drop).transpose(*gap.dims)
+    for axis, flux in zip((along, across), fields, strict=False):
+        variables[f"flux_{axis}"] = (flux * drop).transpose(*gap.dims)
     described = label(xr.Dataset(variables))
     described["leak_rate"].attrs |= {"along": along, "viscosity": viscosity, "pressure_drop": pressure_drop}
     return described
@@ -328,13 +328,13 @@ def closure(dataset: xr.Dataset, *, along: Literal["x", "y"] = "x") -> xr.Datase
     pressure = dataset["force"] / (math.prod(spacing(dataset, "closure")) * height.sizes["x"] * height.sizes["y"])
 
     def stiffness(pressure: np.ndarray, closed: np.ndarray) -> np.ndarray:
-        found = np.full(pressure.shape, np.nan)
+        values = np.full(pressure.shape, np.nan)
         rows = np.flatnonzero(pressure > 0)
         if rows.size > 1:
             with np.errstate(divide="ignore", invalid="ignore"):
                 slope = np.gradient(closed[rows], np.log(pressure[rows]))
-                found[rows] = pressure[rows] / slope
-        return np.where(np.isfinite(found), found, np.nan)
+                values[rows] = pressure[rows] / slope
+        return np.where(np.isfinite(values), values, np.nan)
 
     axis = [str(dim) for dim in mean_gap.dims][-1:]
     stiff = xr.apply_ufunc(

@@ -45,9 +45,9 @@ def expect_result(dataset: Any, *names: str) -> xr.Dataset:
         raise InputError(f"the result has no {axis}: expected at least one row")
     for name in names:
         if name in VARIABLES and set(dataset[name].dims) - {*VARIABLES[name].over(axis)}:  # by xarray's where, for one
-            found = dataset[name].dims
+            dims = dataset[name].dims
             expected = f"dimensions {', '.join(VARIABLES[name].over(axis))}, as stored"
-            raise InputError(key=name, found=found, expected=expected)
+            raise InputError(key=name, found=dims, expected=expected)
     return dataset
 
 

@@ -45,7 +45,7 @@ def study_text(case: Mapping[str, Any]) -> str:
     for name, value in case.items():
         if name in ("origin", "varied"):
             continue
-        several = isinstance(value, list) and any(isinstance(one, dict) for one in value)
+        several = isinstance(value, list) and any(isinstance(item, dict) for item in value)
         if not (several or isinstance(value, dict)):
             text += f"{name} = {toml_text(value)}\n"
             continue

@@ -184,11 +184,11 @@ def _plain(value: Any) -> Any:
             for attribute in fields(value)
             if attribute.compare or attribute.name == "stands_for"
         }
-        return [type(value).__name__, {name: _plain(part) for name, part in parts.items()}]
+        return [type(value).__name__, {name: _plain(inner) for name, inner in parts.items()}]
     if isinstance(value, Mapping):
-        return {name: _plain(part) for name, part in value.items()}
+        return {name: _plain(inner) for name, inner in value.items()}
     if isinstance(value, list | tuple | np.ndarray):
-        return [_plain(part) for part in value]
+        return [_plain(inner) for inner in value]
     return value.__name__ if callable(value) else value
 
 

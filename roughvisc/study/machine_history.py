@@ -176,19 +176,19 @@ def thinned(times: Array, values: Array, tolerance: float) -> NDArray[np.intp]:
     """
     if tolerance <= 0:
         return np.arange(len(times))
-    at = times.tolist()
-    of = values.tolist()
+    time = times.tolist()
+    value = values.tolist()
     kept = [0]
-    while kept[-1] < len(at) - 1:
+    while kept[-1] < len(time) - 1:
         start = kept[-1]
         low = -math.inf
         high = math.inf
         farthest = start + 1
-        for row in range(start + 1, len(at)):
-            if at[row] == at[row - 1]:  # a jump: the line ends before it
+        for row in range(start + 1, len(time)):
+            if time[row] == time[row - 1]:  # a jump: the line ends before it
                 break
-            span = at[row] - at[start]
-            rise = of[row] - of[start]
+            span = time[row] - time[start]
+            rise = value[row] - value[start]
             if low <= rise / span <= high:
                 farthest = row
             low = max(low, (rise - tolerance) / span)

@@ -142,9 +142,9 @@ def _export(description: Mapping[str, Any], table: Mapping[str, Any]) -> Export:
     for key, name in names.items():
         if not isinstance(name, str) or not name.strip():
             raise InputError(key=f"columns.{key}", found=name, expected="the name of a column in the file")
-    part = description.get("part")
-    if part is not None and (not isinstance(part, str) or not part.strip()):
-        raise InputError(key="part", found=part, expected="the text of a line above the names of a step")
+    step = description.get("part")
+    if step is not None and (not isinstance(step, str) or not step.strip()):
+        raise InputError(key="part", found=step, expected="the text of a line above the names of a step")
     if "tan_delta" in names and "loss" in names:
         raise InputError(key="columns.tan_delta", found=names["tan_delta"], expected="either tan_delta or loss")
     wanted = {}
@@ -158,7 +158,7 @@ def _export(description: Mapping[str, Any], table: Mapping[str, Any]) -> Export:
         named = wanted["frequency"]
         if "[" not in named.name and "(" not in named.name:
             wanted["frequency"] = named._replace(name=f"{named.name} [{stated_unit}]")
-    return read_export(description["file"], wanted, part)
+    return read_export(description["file"], wanted, step)
 
 
 def _arguments(model: str, table: Mapping[str, Any], export: Export) -> dict[str, Any]:

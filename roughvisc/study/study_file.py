@@ -272,7 +272,7 @@ def speeds_of(where: str, stated: Any) -> list[float]:
     """Return speeds in increasing order, from one speed, a list, or ``from``, ``to`` and ``count``. [m/s]"""
     if not isinstance(stated, Mapping):
         listed = stated if isinstance(stated, list) else [stated]
-        return sorted({number(one, "m/s", where) for one in listed})
+        return sorted({number(stated_speed, "m/s", where) for stated_speed in listed})
     refuse_unknown(where, stated, ("from", "to", "count"))
     first, last = (number(stated.get(key), "m/s", f"{where}.{key}", above=0) for key in ("from", "to"))
     count: Any = stated.get("count")

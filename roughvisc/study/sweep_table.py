@@ -211,11 +211,11 @@ def place(tables: Any, key: str, value: Any, above: str = "") -> Any:
 
 def value_at(tables: Any, key: str, default: Any) -> Any:
     """Return the value at a dotted key of nested tables."""
-    for part in key.split("."):
-        if isinstance(tables, list) and part.isdecimal() and int(part) < len(tables):
-            tables = tables[int(part)]
-        elif isinstance(tables, Mapping) and part in tables:
-            tables = tables[part]
+    for name in key.split("."):
+        if isinstance(tables, list) and name.isdecimal() and int(name) < len(tables):
+            tables = tables[int(name)]
+        elif isinstance(tables, Mapping) and name in tables:
+            tables = tables[name]
         else:
             return default
     return tables
@@ -288,11 +288,11 @@ def over_realisations(values: xr.DataArray) -> xr.Dataset:
     units = values.attrs.get("units", "1")
     name = str(values.attrs.get("long_name", values.name or "values"))
     variables = {}
-    for one, array in columns.items():
-        unit = "1" if one in ("count", "ratio") else units
-        attributes = {"long_name": f"{one.replace('_', ' ')}: {name}", "units": unit}
-        variables[one] = (values.dims[1:], array, attributes)
-    coords = {key: one for key, one in values.coords.items() if REALISATION not in one.dims}
+    for statistic, array in columns.items():
+        unit = "1" if statistic in ("count", "ratio") else units
+        attributes = {"long_name": f"{statistic.replace('_', ' ')}: {name}", "units": unit}
+        variables[statistic] = (values.dims[1:], array, attributes)
+    coords = {key: coordinate for key, coordinate in values.coords.items() if REALISATION not in coordinate.dims}
     return xr.Dataset(variables, coords, {"quantity": str(values.name or "")})
 
 

@@ -169,7 +169,7 @@ def inspection_of(h: xr.DataArray) -> Inspection:
     spikes = int(masked.isnull().sum()) - gaps
     few = 0 < spikes <= _MOST_SPIKES * h.size
     kept = masked if few else levelled
-    rms_levelled, rms = (float(np.nanstd(one.values)) for one in (levelled, level(kept)))
+    rms_levelled, rms = (float(np.nanstd(surface.values)) for surface in (levelled, level(kept)))
     seen = f"{spikes} ({_percent(spikes / h.size)})"
     advice = "too many to be spikes: check the picture" * (spikes > 0)
     if few:
@@ -185,7 +185,7 @@ def inspection_of(h: xr.DataArray) -> Inspection:
     repeats = max(border_mismatch(kept)) > JUMP >= max(border_mismatch(h))  # a plane would break the periodicity
     order = 2 if form > _FORM else int(not repeats and np.nanstd(plane.values) > _TILTED * rms)
     treated = (level(h, order) if order else h).where(kept.notnull())
-    along_x, along_y = (f"{math.degrees(math.atan(abs(one))):.2g}°" for one in slopes)
+    along_x, along_y = (f"{math.degrees(math.atan(abs(slope))):.2g}°" for slope in slopes)
     seen = f"{along_x} along x, {along_y} along y; a quadratic form accounts for {_percent(form)} of Sq squared"
     with_form = 'level = 2 for the roughness alone; level = 1 and boundary = "free" for contact with the form'
     advice = ("", "level = 1 subtracts the plane", with_form)[order]
@@ -205,7 +205,7 @@ def inspection_of(h: xr.DataArray) -> Inspection:
     advice = f"{kind} than almost any measured surface: check unit, spacing and height_scale" * bool(kind)
     findings["Slope"] = Property(f"{slope:.2g} rms after these steps", advice, {}, {"rms_slope": slope})
 
-    proposed = {name: value for one in findings.values() for name, value in one.step.items()}
+    proposed = {name: value for finding in findings.values() for name, value in finding.step.items()}
     steps = {name: proposed[name] for name in STEPS if name in proposed}
     return Inspection(findings, steps, boundary, nominal_area(treated), slope)
 

@@ -123,7 +123,7 @@ def join_psd(*spectra: xr.Dataset | xr.DataArray) -> xr.Dataset:
     """
     if not spectra:
         raise InputError(key="spectra", found=spectra, expected="at least one spectrum or map of heights")
-    columns = sorted((_columns(one) for one in spectra), key=lambda one: (one[0][0], one[0][-1]))
+    columns = sorted((_columns(spectrum) for spectrum in spectra), key=lambda pair: (pair[0][0], pair[0][-1]))
     reached = columns[0][0][-1]
     for q, _ in columns[1:]:
         if q[0] > reached:

@@ -197,14 +197,14 @@ def _without_no_data(values: np.ndarray, no_data: float | None, complaints: list
 def _chosen(file: ScanFile, channel: int | str | None) -> Channel:
     """Return the channel of a name or a number; the default height if None."""
     named = ", ".join(f"{i}: {c.name!r}{'' if c.is_height else f' ({c.kind})'}" for i, c in enumerate(file.channels))
-    heights = {i: one for i, one in enumerate(file.channels) if one.is_height}
+    heights = {i: height_channel for i, height_channel in enumerate(file.channels) if height_channel.is_height}
     if not heights:
         raise InputError(f"it holds no heights over x and y (channels {named or 'none'}): expected an areal scan")
     if channel is None:
         channel = file.default if file.default in heights else min(heights)
-    for i, one in heights.items():
-        if channel in (i, one.name):
-            return one
+    for i, height_channel in heights.items():
+        if channel in (i, height_channel.name):
+            return height_channel
     raise InputError(key="channel", found=channel, expected=f"a height of {named}")
 
 

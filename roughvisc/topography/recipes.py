@@ -188,8 +188,8 @@ def wavy(amplitude: Quantity, wavelength: Quantity, size: Any, shape: Any, waves
     for side in size[:waves]:
         periods = side / wavelength
         if round(periods) < 1 or abs(periods - round(periods)) > 1e-9 * periods:
-            held = f"{format_quantity(side, 'm')} holds {periods:.6g}"
-            expected = f"a whole number of wavelengths, so that the waves repeat; {held}"
+            message = f"{format_quantity(side, 'm')} holds {periods:.6g}"
+            expected = f"a whole number of wavelengths, so that the waves repeat; {message}"
             raise InputError(key="size", found=size, expected=expected)
     shape = cells(shape)
     repeats = (round(size[0] / wavelength), round(size[1] / wavelength) * (waves == 2))

@@ -158,7 +158,9 @@ def _channel(found: Any) -> Channel:
         sides = (float(sizes[0]) / shape[0], float(sizes[1]) / shape[1])
         header = found.info.get("raw_metadata")
         if found.unit is None and isinstance(header, dict):  # the header may state the units of x and y alone
-            lateral, other = (header.get(f"{one}unit") or header.get(f"{two}unit") for one, two in ("xy", "yx"))
+            lateral, other = (
+                header.get(f"{axis}unit") or header.get(f"{other_axis}unit") for axis, other_axis in ("xy", "yx")
+            )
             if lateral is not None and other != lateral:
                 sides = (sides[0], sides[1] * number(f"1 {other}", lateral))
     return Channel(str(found.channel_id), load, found.unit, lateral, sides)
