@@ -1,7 +1,11 @@
 """Sphinx: ``sphinx-build -W -b html docs docs/_build``."""
 
 import importlib.metadata
+import sys
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+import reference_names
 
 project = "roughvisc"
 author = "The roughvisc developers"
@@ -18,11 +22,15 @@ extensions = [
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
 myst_heading_anchors = 3
 nb_execution_mode = "off"  # docs/make_gallery.py runs the notebook
-exclude_patterns = ["_build"]
+#: Autosummary writes the pages of the names that it finds in files.
+NAMES = "generated/names.rst"
+(Path(__file__).parent / NAMES).parent.mkdir(exist_ok=True)
+(Path(__file__).parent / NAMES).write_text(reference_names.page_of_names())
+exclude_patterns = ["_build", NAMES]
 templates_path = ["_templates"]
 suppress_warnings = ["ref.footnote"]  # sources named at the end of a docstring, not in its text
 
-autosummary_generate = True
+autosummary_generate = [NAMES, "reference.md"]
 autodoc_typehints = "none"  # the docstrings say it, with units
 autodoc_member_order = "bysource"
 napoleon_google_docstring = False
@@ -52,3 +60,13 @@ html_sidebars = {
     },
 }
 copyright = author
+
+
+def setup(app):
+    """Fill the reference with the public names when it is read."""
+
+    def fill(_, name, content):
+        if name == "reference":
+            content[0] = reference_names.filled(content[0])
+
+    app.connect("source-read", fill)

@@ -3,7 +3,7 @@
     python docs/make_gallery.py [--as-they-are] [NAME ...]
 
 draws all pictures in docs/gallery/ and docs/figures/, runs the notebook and writes gallery.md. With names it draws only
-the pictures of these studies, scripts or other figures. A picture is written only if a pixel of it has changed.
+the pictures of these studies, scripts or other figures. A picture is written only if a pixel has changed.
 
 docs/drawn.json records the code that drew each picture, and a test names the pictures that are older than their code.
 After a change of the code that changes no picture, ``--as-they-are`` records the code without drawing.
@@ -194,7 +194,7 @@ SEEN = {
     ),
     "zener_step": (
         "Pressure against radius at four times for two Zener materials, computed points on the lines of the closed form",
-        "Left, equal moduli: the pressure becomes that of Hertz for the rubbery modulus. Right, a softer Kelvin "
+        "Left, equal moduli: the pressure becomes the pressure of Hertz for the rubbery modulus. Right, a softer Kelvin "
         "element: a shoulder near the edge appears and fades.",
     ),
     "thin_sheet": (

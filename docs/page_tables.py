@@ -4,12 +4,14 @@
 ``<!-- table "variables" -->`` in a page stands above each table; a new table needs this line only.
 """
 
+import inspect
 import re
 from functools import partial
 from pathlib import Path
 
 import study_keys
 
+import roughvisc as rv
 from roughvisc.judge.audit import LIMITS
 from roughvisc.topography.formats import STATED, TAKEN, TOP_FIRST
 from roughvisc.variables import STATUS_MEANINGS, STEP, VARIABLES
@@ -51,8 +53,52 @@ def orientations():
     return "\n".join([*lines, f"| all others | y = 0 | {TAKEN} |"])
 
 
+#: Arguments of functions of cases and results -> their meaning, the same in all functions.
+ARGUMENTS = {
+    ("tolerance", "boundary", "grid_error", "numerics", "fields"): "settings of the solve",
+    ("times", "missing", "edge", "adhesion"): "settings of the solve under a program",
+    ("case",): "a case, or its study file",
+    ("cases",): "cases, or their study file",
+    ("out",): "folder of the results",
+    ("path",): "a file that is read or written",
+    ("workers",): "number of processes; 0: this process",
+    ("client",): "client of a Dask cluster",
+    ("threads",): "threads of one case on a large grid",
+    ("progress",): "a progress bar",
+}
+
+
+def functions_of_cases():
+    """Return the public functions of cases and results by name."""
+    functions = [rv.Case, rv.simulate, rv.friction, rv.vary, rv.read_study, rv.read_cases, rv.run]
+    functions += [rv.sweep, rv.plan, rv.trade, rv.budget, rv.audit, rv.observe, rv.save_result]
+    functions += [rv.open_result, rv.open_results, rv.to_table, rv.to_csv, rv.report]
+    return {one.__name__: one for one in functions} | {"plot.page": rv.plot.page}
+
+
+def arguments():
+    """Return the table of arguments that several functions have, with the functions."""
+    functions = functions_of_cases().items()
+    known = {name: inspect.signature(one).parameters for name, one in functions}
+    lines = ["| argument | meaning | functions |", "|---|---|---|"]
+    for names, meaning in ARGUMENTS.items():
+        sharing = [", ".join(f"`{one}`" for one in known if name in known[one]) for name in names]
+        assert len(set(sharing)) == 1, f"{names} are not arguments of the same functions"
+        also = [
+            one
+            for one, taken in known.items()
+            if names == ("progress",) and "Progress" in str(taken.get("progress"))
+        ]
+        if also:
+            meaning += f"; in {', '.join(f'`{one}`' for one in also)} also a function of the "
+            meaning += "progress and its end"
+        lines.append(f"| {', '.join(f'`{one}`' for one in names)} | {meaning} | {sharing[0]} |")
+    return "\n".join(lines)
+
+
 #: Name of a table -> function that returns it.
 TABLES = {
+    "arguments": arguments,
     "variables": variables,
     "limits": limits,
     "orientations": orientations,
@@ -63,7 +109,7 @@ MARK = re.compile(r'^<!-- table "(.+)" -->\n(\n\|.*(?:\n\|.*)*\n)?', re.M)
 
 
 def filled(page):
-    """Return the text of a page with its tables as the package has them now."""
+    """Return the text of a page with the present tables of the package."""
     return MARK.sub(lambda mark: f'<!-- table "{mark[1]}" -->\n\n{TABLES[mark[1]]()}\n', page)
 
 

@@ -38,7 +38,7 @@ def _is_docstring(code):
 
 @functools.cache
 def plot_module(name):
-    """Return the code of a module of ``roughvisc.plot`` as text, and the modules of it that it imports."""
+    """Return the code of a module of ``roughvisc.plot`` as text, and the modules of ``roughvisc.plot`` that it imports."""
     tree = ast.parse(inspect.getsource(importlib.import_module(name)))
     imported = []
     for node in ast.walk(tree):
@@ -66,13 +66,13 @@ def digest_of(code, study=None):
 
 
 def record(digests):
-    """Write the digests of some pictures to ``drawn.json``; those of other pictures stay."""
+    """Write the digests of some pictures to ``drawn.json``; other digests stay."""
     known = json.loads(DRAWN.read_text(encoding="utf-8")) if DRAWN.exists() else {}
     text = json.dumps(known | digests, indent=1, sort_keys=True)
     DRAWN.write_text(text + "\n", encoding="utf-8")
 
 
 def older(digests):
-    """Return the pictures whose recorded digest is not that of the code."""
+    """Return the pictures whose recorded digest differs from the digest of the code."""
     known = json.loads(DRAWN.read_text(encoding="utf-8"))
     return [name for name, digest in digests.items() if known.get(name) != digest]

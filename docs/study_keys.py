@@ -25,7 +25,7 @@ HEAD = ("key", "unit", "default", "meaning")
 _DESCRIBED_BY = {Settings: rv.simulate, SteadySliding: rv.friction, Numerics: Numerics}
 #: Keys that are not arguments of a function: unit, default, meaning.
 _FILE = {
-    "file": ("", "none", "a table as exported, in place of the lists, relative to the study"),
+    "file": ("", "none", "an exported table, instead of the lists, relative to the study"),
     "columns": ("", "none", "names of the columns in the file, with a unit that it lacks"),
     "part": (
         "",

@@ -1,17 +1,32 @@
 """Contact of measured rough surfaces with linear viscoelastic materials.
 
-``__init__.pyi`` lists the public names of ``import roughvisc as rv``. Each name is imported from its module at its
-first use, so that importing the package is quick.
+``__init__.pyi`` lists the public names of ``import roughvisc as rv``, ``materials.py`` and ``surfaces.py`` the names of
+constructors. Each name is imported from its module at its first use, so that importing the package is quick.
 """
 
 from __future__ import annotations
 
 from importlib import import_module
 
-with open(f"{__file__}i", encoding="utf-8") as _stub:
-    _lines = [line.split() for line in _stub if line.startswith("from ")]
-#: Public name -> its module, from each line ``from module import name as name``.
-_MODULES = {words[3]: words[1] for words in _lines if len(words) == 6 and words[3] == words[5]}
+
+def _modules(name: str) -> dict[str, str]:
+    """Return public name -> module, as the import statements of a file of this package list them."""
+    modules = {}
+    with open(f"{__path__[0]}/{name}", encoding="utf-8") as file:
+        statements = file.read().split("\nfrom ")[1:]
+    for statement in statements:
+        module, _, listed = statement.partition(" import ")
+        listed = listed[1 : listed.index(")")] if listed.startswith("(") else listed.partition("\n")[0]
+        for entry in filter(None, map(str.strip, listed.split(","))):
+            if entry == "*":
+                modules |= _modules(f"{module.rpartition('.')[2]}.py")
+            else:
+                modules[entry.partition(" as ")[0]] = module
+    return modules
+
+
+#: Public name -> its module.
+_MODULES = _modules("__init__.pyi")
 __all__ = ["__version__", *sorted(_MODULES)]
 
 

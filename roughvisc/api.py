@@ -116,6 +116,10 @@ def simulate(
     ConvergenceError
         If the contact of a step is not solved; the message states the time, the error and what to try.
 
+    See Also
+    --------
+    roughvisc.friction, roughvisc.Case, roughvisc.Program, roughvisc.observables.history
+
     Examples
     --------
     >>> import roughvisc as rv
@@ -208,6 +212,10 @@ def friction(
     ConvergenceError
         If the contact at a speed is not solved; the message states the speed, the error and what to try.
 
+    See Also
+    --------
+    roughvisc.simulate, roughvisc.SteadySliding, roughvisc.plot.friction, roughvisc.friction_theory
+
     Notes
     -----
     In the steady state the friction force times the speed equals the power dissipated in the material. The force is
@@ -229,8 +237,8 @@ def friction(
     """
     curve = SteadySliding(speeds=speeds, load=load, pressure=pressure, direction=direction, heating=heating)
     settings = {"boundary": boundary, "tolerance": tolerance, "fields": fields, "grid_error": grid_error}
-    found = _solved(height, material, curve, settings, numerics, 4, progress=progress, threads=threads)
-    return found.assign_attrs(title="Steady sliding")
+    result = _solved(height, material, curve, settings, numerics, 4, progress=progress, threads=threads)
+    return result.assign_attrs(title="Steady sliding")
 
 
 def _solved(
@@ -297,14 +305,29 @@ def run(
     Raises
     ------
     InputError
-        If the input is invalid; nothing is written. If a wanted error cannot be reached: the message states the
-        smallest error that can be reached, and its sources. If a quantity in ``[observe]`` cannot be computed from the
-        result; the result is kept.
+        If the input is invalid, or the folder holds the sweep of another study; nothing is written. If a wanted error
+        cannot be reached: the message states the smallest error that can be reached, and its sources. If a quantity in
+        ``[observe]`` cannot be computed from the result; the result is kept.
     TooLargeError
         If the case needs more memory than is available. It is refused before any memory is allocated, and no failure is
         recorded.
     ConvergenceError
         If the contact of a step or at a speed is not solved; no result is written.
+
+    See Also
+    --------
+    roughvisc.simulate, roughvisc.sweep, roughvisc.Case, roughvisc.open_result
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=15), rv.Program().load(1e-5, over="1 s")
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ds = rv.run(case, folder, progress=False).load()
+    >>> ds.attrs["case_key"] == case.key
+    True
     """
     from roughvisc.runs.netcdf import open_result
     from roughvisc.runs.run import result_folder

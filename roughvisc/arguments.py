@@ -108,8 +108,12 @@ def arguments(function: Callable[..., Any], skipped: int = 0) -> dict[str, tuple
     hints = get_type_hints(function)
     parameters = list(inspect.signature(function).parameters.values())[skipped:]
     stated = dataclasses.fields(function) if dataclasses.is_dataclass(function) else ()
-    hidden = {one.name for one in stated if not one.repr}
-    return {one.name: (hints.get(one.name, Any), one.default) for one in parameters if one.name not in hidden}
+    hidden = {parameter.name for parameter in stated if not parameter.repr}
+    return {
+        parameter.name: (hints.get(parameter.name, Any), parameter.default)
+        for parameter in parameters
+        if parameter.name not in hidden
+    }
 
 
 @cache
@@ -169,6 +173,13 @@ def one_of(key: str, value: Any, words: Iterable[Any]) -> Any:
     return value
 
 
+def count(key: str, value: Any, least: int) -> int | None:
+    """Return a whole number of at least `least`, or None; refuse any other value."""
+    if value is not None and (isinstance(value, bool) or not isinstance(value, int) or value < least):
+        raise InputError(key=key, found=value, expected=f"a whole number of at least {least}, or None")
+    return value
+
+
 def listed_names(value: Any) -> tuple[Any, ...]:
     """Return the names of a list of names; a text is one name, and any other value a wrong one."""
     return tuple(value) if isinstance(value, Iterable) and not isinstance(value, str) else (value,)
@@ -217,7 +228,7 @@ def suits(value: Any, hint: Any) -> bool:
     if kind in (Union, types.UnionType):
         return any(map(partial(suits, value), inner))
     if kind is Literal:
-        return any(value == one and isinstance(value, type(one)) for one in inner)
+        return any(value == word and isinstance(value, type(word)) for word in inner)
     if kind in (tuple, Sequence):
         if not isinstance(value, list | tuple):
             return False
@@ -245,12 +256,12 @@ def in_words(hint: Any, unit: str = "1") -> str:
     ('a number [Pa], or text with a unit', "'x' or 'y'", 'a list')
     """
     kind = get_origin(hint)
-    inner = [one for one in get_args(hint) if one is not type(None)]
+    inner = [choice for choice in get_args(hint) if choice is not type(None)]
     if kind is Literal:
         return " or ".join(map(repr, inner))
     if kind in (Union, types.UnionType):
         if {float, str} <= set(inner) and unit != "1":
-            others = [in_words(one) for one in inner if one not in (float, str)]
+            others = [in_words(choice) for choice in inner if choice not in (float, str)]
             return " or ".join([f"a number [{unit}], or text with a unit", *others])
         return " or ".join(dict.fromkeys(map(in_words, inner)))
     named = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}

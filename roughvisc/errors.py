@@ -23,6 +23,19 @@ class RoughviscError(Exception):
     ----------
     transient
         As given.
+
+    See Also
+    --------
+    roughvisc.InputError, roughvisc.ConvergenceError
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> try:
+    ...     rv.elastic(shear_modulus="-1 MPa")
+    ... except rv.RoughviscError as error:
+    ...     print(error)
+    shear_modulus: found '-1 MPa': expected a number [Pa], or text with a unit, above 0
     """
 
     transient = False
@@ -53,6 +66,10 @@ class InputError(RoughviscError, ValueError):
     key, found, expected
         As given. Programs and tests read these and never the message.
 
+    See Also
+    --------
+    roughvisc.EdgeContactError, roughvisc.TooLargeError
+
     Examples
     --------
     >>> print(InputError(key="material.shear_modulus", found="3 N", expected="a modulus [Pa]"))
@@ -78,17 +95,60 @@ class InputError(RoughviscError, ValueError):
 
 
 class EdgeContactError(InputError):
-    """Contact at the border of a surface in free space."""
+    """Contact at the border of a surface in free space.
+
+    See Also
+    --------
+    roughvisc.InputError
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> block, press = rv.from_array([[0.0, 0.0], [0.0, 0.0]], spacing="1 um"), rv.Program().load("1 uN", over=0)
+    >>> try:
+    ...     ds = rv.simulate(block, rv.elastic(1e6), press, boundary="free", progress=False)
+    ... except rv.EdgeContactError:
+    ...     ds = rv.simulate(block, rv.elastic(1e6), press, boundary="free", edge="accept", progress=False)
+    >>> ds.contact_fraction[-1].item()
+    1.0
+    """
 
 
 class TooLargeError(InputError):
-    """A case needs more memory than is available: the message states how much, and what would fit."""
+    """A case needs more memory than is available: the message states how much, and what would fit.
+
+    See Also
+    --------
+    roughvisc.InputError, roughvisc.plan
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> try:
+    ...     wave = rv.wavy("1 um", "1 mm", "1 mm", 64)
+    ... except rv.TooLargeError as error:
+    ...     print(error)
+    """
 
     transient = True  # it may fit elsewhere
 
 
 class ConvergenceError(RoughviscError, RuntimeError):
-    """A step did not reach its tolerance: the message names the time, the residual and what to try."""
+    """A step did not reach its tolerance: the message names the time, the residual and what to try.
+
+    See Also
+    --------
+    roughvisc.RoughviscError
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(1e-3, 2e-4, 15), rv.Program().load(1e-5, over=0)
+    >>> try:
+    ...     ds = rv.simulate(ball, rv.elastic(1e6), press, progress=False)
+    ... except rv.ConvergenceError as error:
+    ...     print(error)
+    """
 
 
 def short_repr(value: object) -> str:

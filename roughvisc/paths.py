@@ -110,7 +110,7 @@ def opened(path: Path, expected: str = "a file") -> Iterator[BufferedReader]:
 
 
 def read_bytes(path: Path, expected: str = "a file") -> bytes:
-    """Return the content of a regular file; the errors are those of :func:`opened`."""
+    """Return the content of a regular file; errors as for :func:`opened`."""
     with opened(path, expected) as stream:
         return stream.read()
 

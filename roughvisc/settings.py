@@ -56,6 +56,10 @@ class Numerics:
     InputError
         If a value is invalid.
 
+    See Also
+    --------
+    roughvisc.simulate, roughvisc.friction
+
     Examples
     --------
     >>> Numerics(time_step="10 ms")
@@ -67,8 +71,8 @@ class Numerics:
 
     def __post_init__(self) -> None:
         for name, words in WORDS.items():
-            if (found := getattr(self, name, words[0])) not in words:
-                raise InputError(key=name, found=found, expected=" or ".join(map(repr, words)))
+            if (chosen := getattr(self, name, words[0])) not in words:
+                raise InputError(key=name, found=chosen, expected=" or ".join(map(repr, words)))
         if self.time_step != "auto":
             try:
                 step = number(self.time_step, "s", "time_step", above=0)
@@ -126,8 +130,8 @@ class Settings(Numerics):
         if not isinstance(self.adhesion, Adhesion | None):
             expected = "rv.adhesion(work=..., range=...), or None"
             raise InputError(key="adhesion", found=self.adhesion, expected=expected)
-        found = {"tolerance": tolerance, "times": times, "fields": names, "grid_error": grid_error}
-        for name, value in found.items():
+        chosen = {"tolerance": tolerance, "times": times, "fields": names, "grid_error": grid_error}
+        for name, value in chosen.items():
             object.__setattr__(self, name, value)
 
 

@@ -17,7 +17,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy import fft
 
-from roughvisc.errors import InputError
+from roughvisc.arguments import count
 from roughvisc.experiment.accuracy import filled_warning
 from roughvisc.experiment.base import Experiment, Outgrown, Row, Rows
 from roughvisc.experiment.grid_error import with_grid_error
@@ -93,7 +93,8 @@ class Recorder:
 
     def restart(self) -> None:
         """Delete all rows, because the solve starts again."""
-        self.plain, self._arrays = [], []
+        self.plain = []
+        self._arrays = []
 
 
 def solve(
@@ -132,16 +133,15 @@ def solve(
     ConvergenceError
         If the contact of a step or at a speed is not solved.
     """
-    if threads is None:
+    if count("threads", threads, 1) is None:
         from dask.system import CPU_COUNT  # slow to import
 
         threads = int(fft.get_workers())
         is_alone = threading.current_thread() is threading.main_thread() and multiprocessing.parent_process() is None
         threads = CPU_COUNT if threads == 1 and is_alone else threads
-    elif isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
-        raise InputError(key="threads", found=threads, expected="a whole number of at least 1, or None")
     problem = experiment.resolved(problem)
-    height, settings = problem.height, problem.settings
+    height = problem.height
+    settings = problem.settings
     # a curve of steady sliding does so itself
     loading = experiment if settings.grid_error and isinstance(experiment, Loading) else None
     compared = ("pressure", "gap") if attraction(settings) is not None else ("pressure",)
@@ -161,9 +161,10 @@ def solve(
 
             def on_coarser(few: xr.DataArray, times: list[float]) -> xr.Dataset:
                 coarse = replace(problem, height=few, settings=replace(settings, fields=("pressure",), times=times))
-                found = solve_on_grid(coarse, loads, Recorder())
-                apart = np.abs(found["time"].values[:, None] - times)  # in a slide times differ by half a coarser cell
-                return found.isel(time=apart.argmin(axis=0))
+                dataset = solve_on_grid(coarse, loads, Recorder())
+                # in a slide times differ by half a coarser cell
+                apart = np.abs(dataset["time"].values[:, None] - times)
+                return dataset.isel(time=apart.argmin(axis=0))
 
             dataset = with_grid_error(dataset, height, on_coarser).drop_vars(needed)
     if experiment.axis == "time":
@@ -176,8 +177,10 @@ def solve_on_grid(
     problem: Problem, experiment: Experiment, recorder: Recorder, report: Progress | None = None
 ) -> xr.Dataset:
     """Solve on the given grid, without the runs on coarser grids and without labels."""
-    began, reached = time.perf_counter(), recorder.latest
-    state, spent = reached.state, reached.wall_time
+    began = time.perf_counter()
+    reached = recorder.latest
+    state = reached.state
+    spent = reached.wall_time
     while True:
         rows = experiment.rows(problem, state, in_memory=recorder.in_memory)
         if reached.state is not None:
@@ -192,7 +195,8 @@ def solve_on_grid(
         except Outgrown as outgrown:
             log.info("contact has outgrown its domain: the run begins again on a larger one")
             recorder.restart()
-            reached, state = recorder.latest, outgrown.args[0]
+            reached = recorder.latest
+            state = outgrown.args[0]
 
 
 def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dataset:
@@ -212,7 +216,9 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     xarray.Dataset
         Over the axis of the experiment, not labelled yet.
     """
-    height, settings, axis = rows.problem.height, rows.problem.settings, experiment.axis
+    height = rows.problem.height
+    settings = rows.problem.settings
+    axis = experiment.axis
     steps = recorder.plain
     kept = list(filter(itemgetter("kept"), steps))
     numbers = np.flatnonzero(list(map(itemgetter("kept"), steps))).tolist()
@@ -229,8 +235,8 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     coordinates = {axis: columns.pop(axis), "x": height["x"].values, "y": height["y"].values}
     variables |= columns
     for name in settings.fields:
-        found = recorder.field(name, numbers, (height.shape[0], height.shape[1]))
-        variables[name] = (axis, "x", "y"), found
+        frames = recorder.field(name, numbers, (height.shape[0], height.shape[1]))
+        variables[name] = (axis, "x", "y"), frames
     if "filled" in height.coords:
         variables["filled"] = ("x", "y"), height["filled"].values
     made = {
@@ -243,7 +249,8 @@ def dataset_of(experiment: Experiment, rows: Rows, recorder: Recorder) -> xr.Dat
     } | experiment.facts(rows.problem.body, height)
     dataset, warnings = rows.finish(xr.Dataset(variables, coordinates, made))
 
-    tables, lines = list[str](), list[str]()
+    tables = list[str]()
+    lines = list[str]()
     for material in rows.problem.body.materials:
         if material.warning and material.warning not in tables:
             tables.append(material.warning)

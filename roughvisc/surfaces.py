@@ -3,7 +3,7 @@
 from roughvisc.topography.exchange import from_topography
 from roughvisc.topography.framing import combine, mirror
 from roughvisc.topography.readers import from_array
-from roughvisc.topography.recipes import cone, flat_punch, self_affine, sphere, surrogates, wavy
+from roughvisc.topography.recipes import cone, flat_punch, from_spectrum, self_affine, sphere, surrogates, wavy
 from roughvisc.topography.scans import open_scan
 
 __all__ = [
@@ -11,6 +11,7 @@ __all__ = [
     "cone",
     "flat_punch",
     "from_array",
+    "from_spectrum",
     "from_topography",
     "mirror",
     "open_scan",

@@ -110,8 +110,8 @@ def name_and_unit(heading: str) -> tuple[str, str]:
     >>> name_and_unit("Force (left) [mN]"), name_and_unit("fluidity [1/(Pa s)]"), name_and_unit("time")
     (('Force (left)', 'mN'), ('fluidity', '1/(Pa s)'), ('time', ''))
     """
-    found = _HEADING.fullmatch(heading.strip())
-    return (found["name"], found["square"] or found["round"] or "") if found else (heading.strip(), "")
+    matched = _HEADING.fullmatch(heading.strip())
+    return (matched["name"], matched["square"] or matched["round"] or "") if matched else (heading.strip(), "")
 
 
 class Wanted(NamedTuple):
@@ -167,20 +167,24 @@ def read_table(path: str | Path, wanted: Mapping[str, Wanted]) -> tuple[dict[str
     path = path_of(path, "path")
     separator, rows = _rows(path)
     needed = [one.name for one in wanted.values() if not one.optional]
-    headings = (at for at, (_, cells) in enumerate(rows[:_FIRST]) if all(_places(cells, name) for name in needed))
+    headings = (place for place, (_, cells) in enumerate(rows[:_FIRST]) if all(_places(cells, name) for name in needed))
     if (above := next(headings, None)) is None:
         raise _no_heading(path, rows, separator, wanted)
-    (line, heading), below = rows[above], rows[above + 1 :]
+    line, heading = rows[above]
+    below = rows[above + 1 :]
     if not below:
         raise InputError(f"{path}: holds no rows below the heading in line {line}: expected {', '.join(wanted)}")
-    places = {key: found for key, one in wanted.items() if (found := _places(heading, one.name))}
+    places = {key: places_of_name for key, one in wanted.items() if (places_of_name := _places(heading, one.name))}
     converted = {
-        key: _conversion(path, line, [heading[at] for at in found], key, wanted[key]) for key, found in places.items()
+        key: _conversion(path, line, [heading[place] for place in places_of_name], key, wanted[key])
+        for key, places_of_name in places.items()
     }
     for row, cells in below:
         if any(cells[len(heading) :]) or (separator == " " and len(cells) != len(heading)):
             raise InputError(f"{path}, line {row}: found {len(cells)} cells: expected {len(heading)}, as above")
-    texts = {key: [cells[at] if at < len(cells) else "" for _, cells in below] for key, (at, *_) in places.items()}
+    texts = {
+        key: [cells[place] if place < len(cells) else "" for _, cells in below] for key, (place, *_) in places.items()
+    }
     try:
         mark = decimal_mark((cell for column in texts.values() for cell in column), separator)
     except InputError as error:
@@ -190,7 +194,8 @@ def read_table(path: str | Path, wanted: Mapping[str, Wanted]) -> tuple[dict[str
         values = [float(plain_number(cell, mark) or "nan") for cell in column]
         for (row, _), cell, value in zip(below, column, values, strict=True):
             if not math.isfinite(value):
-                where, expected = f"{path}, line {row}", f"a number for {key}"
+                where = f"{path}, line {row}"
+                expected = f"a number for {key}"
                 raise InputError(f"{where}: found {cell!r}: expected {expected}", found=cell, expected=expected)
         columns[key] = np.array(list(map(converted[key], values)))
     return columns, [row for row, _ in below]
@@ -278,7 +283,7 @@ def _plain(name: str) -> str:
 def _no_heading(path: Path, rows: Sequence[_Row], separator: str, wanted: Mapping[str, Wanted]) -> InputError:
     """Return the error of a table without a heading; it states the heading to write."""
     sign = {",": ", ", ";": "; "}.get(separator, separator)
-    write = sign.join(_example(one.name, one.unit) for one in wanted.values() if not one.optional)
+    write = sign.join(_example(column.name, column.unit) for column in wanted.values() if not column.optional)
     line, widest = max(rows[:_FIRST], key=lambda row: len(row[1]), default=(0, ["no rows"]))
     found = f"found {sign.join(widest)[:200]!r} in line {line}"
     return InputError(f"{path}: {found}: expected a heading, {write!r}", found=found, expected=write)
@@ -301,9 +306,10 @@ def _conversion(path: Path, line: int, names: Sequence[str], key: str, one: Want
         raise InputError(f"{where}: unit of {key}: {problem}: expected one unit")
     unit = given or stated
     if not unit:
-        found, expected = names[0], _example(names[0], one.unit)
-        message = f"{where}: found the column {found!r} without a unit: expected a heading, {expected!r}"
-        raise InputError(message, found=found, expected=expected)
+        heading = names[0]
+        expected = _example(names[0], one.unit)
+        message = f"{where}: found the column {heading!r} without a unit: expected a heading, {expected!r}"
+        raise InputError(message, found=heading, expected=expected)
     try:
         factor, zero = (1.0, 0.0) if unit == one.unit else (number(f"{n} {unit}", one.unit) for n in (1, 0))
     except InputError as error:
@@ -361,7 +367,8 @@ _KINDS_OF_UNITS = ("1", "s", "1/s", "Pa", "1/Pa", "Pa s", "K", "m", "N")
 #: A cell that looks like a number, but not like a unit such as ``1/MPa``.
 _LIKE_A_NUMBER = re.compile(r"[+-]?[.,]?\d[^A-DF-Za-df-zµ°%/]*")
 #: Largest number of rows of units below the names, and of lines that a note lists.
-_UNIT_ROWS, _LISTED = 2, 6
+_UNIT_ROWS = 2
+_LISTED = 6
 
 
 def read_export(path: str | Path, wanted: Mapping[str, Wanted], part: str | None = None) -> Export:
@@ -390,7 +397,7 @@ def read_export(path: str | Path, wanted: Mapping[str, Wanted], part: str | None
     Notes
     -----
     The heading is the first line with all names; a unit is part of a name, as ``f [Hz]``, or in one of two rows below
-    the names. Rows with an empty cell or a text in place of a number are left out, and so are repeated headings.
+    the names. Rows with an empty cell or a text instead of a number are left out, and so are repeated headings.
     """
     path = path_of(path, "path")
     try:
@@ -417,7 +424,8 @@ def read_export(path: str | Path, wanted: Mapping[str, Wanted], part: str | None
         for line, row in zip(table.lines, table.rows, strict=True):
             value = float(plain_number(row[number_of_column], mark) or "nan")
             if not math.isfinite(value):
-                where, expected = f"{path}, line {line}", f"a number for {key}"
+                where = f"{path}, line {line}"
+                expected = f"a number for {key}"
                 cell = row[number_of_column]
                 raise InputError(f"{where}: found {cell!r}: expected {expected}", found=cell, expected=expected)
             values.append(convert(value))
@@ -465,7 +473,7 @@ def _export_heading(
     path: Path, lines: list[tuple[int, str]], wanted: Mapping[str, Wanted]
 ) -> tuple[int, str, list[str], dict[str, int]]:
     """Return the place of the line of the names, the separator, the names, and the position of each wanted column."""
-    needed = [one.name for one in wanted.values() if not one.optional]
+    needed = [column.name for column in wanted.values() if not column.optional]
     best: tuple[int, list[str], str] = (0, [], "")
     for is_comment in (False, True):  # names may be in a comment
         for above, (line, text) in enumerate(lines):
@@ -480,14 +488,18 @@ def _export_heading(
                     best = line, missing, text
                 if missing:
                     continue
-                positions = {key: found for key, one in wanted.items() if (found := _places(heading, one.name))}
-                for key, found in positions.items():
-                    if len(found) > 1:
-                        names = ", ".join(heading[place] for place in found)
+                positions = {
+                    key: places_of_name
+                    for key, column in wanted.items()
+                    if (places_of_name := _places(heading, column.name))
+                }
+                for key, places_of_name in positions.items():
+                    if len(places_of_name) > 1:
+                        names = ", ".join(heading[place] for place in places_of_name)
                         raise InputError(
                             f"{path}, line {line}: {key} = {wanted[key].name!r} fits the columns {names}: expected one"
                         )
-                return above, separator, heading, {key: found[0] for key, found in positions.items()}
+                return above, separator, heading, {key: places_of_name[0] for key, places_of_name in positions.items()}
     expected = f"a line with the names {', '.join(map(repr, needed))}"
     absent = f"found no {best[1][0]!r} in line {best[0]}, {best[2][:100]!r}" if best[1] else "found no such line"
     raise InputError(f"{path}: {absent}: expected {expected}", found=absent, expected=expected)
@@ -497,7 +509,10 @@ class _ExportTable:
     """Rows of numbers below the names of an export, and rows of units."""
 
     def __init__(self, path: Path, separator: str, heading: list[str], places: dict[str, int]) -> None:
-        self.path, self.separator, self.heading, self.places = path, separator, heading, places
+        self.path = path
+        self.separator = separator
+        self.heading = heading
+        self.places = places
         self.rows: list[list[str]] = []
         self.lines: list[int] = []
         self.left_out: list[int] = []
@@ -505,7 +520,8 @@ class _ExportTable:
 
     def read(self, lines: list[tuple[int, str]], *, has_part: bool) -> None:
         """Read the rows; with a part up to the end of this step, without one refuse the rows of another step."""
-        since_names, interrupted = 0, 0
+        since_names = 0
+        interrupted = 0
         for line, text in lines:
             if text.startswith("#"):
                 continue
@@ -532,7 +548,8 @@ class _ExportTable:
                         raise InputError(f"{where}: found {cell!r}: expected {expected}", found=cell, expected=expected)
                 self.left_out.append(line)
             elif row == self.heading:
-                since_names, interrupted = 0, 0
+                since_names = 0
+                interrupted = 0
                 self.left_out.append(line)
             elif since_names <= _UNIT_ROWS and len(row) > max(self.places.values()):
                 for key, cell in zip(self.places, wanted, strict=True):
@@ -545,7 +562,7 @@ class _ExportTable:
                     return
 
     def _row(self, line: int, text: str) -> tuple[list[str], list[str]]:
-        """Return the cells of a line, and those of the wanted columns; missing ones are empty."""
+        """Return the cells of a line, and the cells of the wanted columns; missing ones are empty."""
         row = text.split() if self.separator in (" ", "  ") else _cells(text, self.separator)
         between_blanks = text.split()
         if len(row) == 1 < len(between_blanks) == len(self.heading):  # names between tabs above numbers between blanks

@@ -105,24 +105,27 @@ def number(
     """
     if getattr(value, "shape", None) == ():
         value = value.item()
-    found, problem = math.nan, ""
+    magnitude = math.nan
+    problem = ""
     if isinstance(value, str):
         try:
-            found = _parsed(value, unit, difference)
+            magnitude = _parsed(value, unit, difference)
         except ValueError as error:
             problem = f", {error}"
     elif isinstance(value, Real) and not isinstance(value, bool):
         with suppress(OverflowError):  # an integer of hundreds of digits
-            found = float(value)
-    is_within = math.isfinite(found) and not (above == 0 and found < sys.float_info.min)  # its reciprocal overflows
+            magnitude = float(value)
+    is_within = math.isfinite(magnitude) and not (
+        above == 0 and magnitude < sys.float_info.min
+    )  # its reciprocal overflows
     words = []
     bounds = (("above", gt, above), ("at least", ge, least), ("up to", le, most), ("below", lt, below))
     for word, compare, limit in bounds:
         if limit is not None:
-            is_within = is_within and compare(found, limit)
+            is_within = is_within and compare(magnitude, limit)
             words.append(f"{word} {limit:g}")
     if is_within:
-        return found
+        return magnitude
     kind = "a number" if unit in ("", "1") else f"a number [{unit}], or text with a unit,"
     expected = f"{kind} {' and '.join(words)}" if words else kind.rstrip(",")
     named = f"{key}: " if key else ""
@@ -156,10 +159,10 @@ def in_si(value: Any, unit: str, name: str) -> Any:
     if isinstance(value, str):
         return number(value, unit, name)
     if isinstance(value, Mapping):
-        return {key: in_si(one, unit, f"{name}[{key!r}]") for key, one in value.items()}
+        return {key: in_si(inner, unit, f"{name}[{key!r}]") for key, inner in value.items()}
     if not isinstance(value, list | tuple) or {str, np.str_, list, tuple}.isdisjoint(map(type, value)):
         return value
-    return type(value)([in_si(one, unit, f"{name}[{place}]") for place, one in enumerate(value)])
+    return type(value)([in_si(inner, unit, f"{name}[{place}]") for place, inner in enumerate(value)])
 
 
 def listed(value: Any, unit: str, key: str, otherwise: str = "") -> NDArray[np.float64]:
@@ -200,7 +203,7 @@ def listed(value: Any, unit: str, key: str, otherwise: str = "") -> NDArray[np.f
     entries = list(plain)
     if {float, int}.issuperset(map(type, entries)):
         return np.array(entries, dtype=float)
-    return np.array([number(one, unit, f"{key}[{place}]") for place, one in enumerate(entries)])
+    return np.array([number(entry, unit, f"{key}[{place}]") for place, entry in enumerate(entries)])
 
 
 def quantities(**units: str) -> Callable[[_Taking], _Taking]:
@@ -246,7 +249,8 @@ def quantities(**units: str) -> Callable[[_Taking], _Taking]:
                 names = ", ".join(name for name in taking.parameters if name != "self")
                 raise TypeError(f"{owner}(): {problem}: expected {names}") from None
             for name in filter(bound.arguments.__contains__, declared):
-                (unit, limit), value = declared[name], bound.arguments[name]
+                unit, limit = declared[name]
+                value = bound.arguments[name]
                 if name in lists:
                     numbers = listed(value, unit, name).tolist()
                     bound.arguments[name] = tuple(numbers) if isinstance(value, tuple) else numbers
@@ -278,27 +282,31 @@ def _parsed(text: str, unit: str, difference: bool) -> float:
     matched = _QUANTITY.fullmatch(text.replace("°C", "degC").replace("°F", "degF")) if len(text) <= 100 else None
     if matched is None:
         raise ValueError("not a quantity")
-    value, found = float(matched[1]), matched[2]
+    value = float(matched[1])
+    unit_text = matched[2]
     dimensionless = unit in ("", "1")
-    if found is None:
+    if unit_text is None:
         if dimensionless:
             return value
         raise ValueError(f"without a unit (such as {f'{matched[1]} {unit}'!r})")
-    if (plain := _prefixed(matched[1], found, unit)) is not None:
+    if (plain := _prefixed(matched[1], unit_text, unit)) is not None:
         return plain
     from pint import PintError, get_application_registry  # slow to import
 
     registry = get_application_registry()
     try:
-        known = "percent" if found == "%" else _written_powers(found.replace("·", "*"))
+        known = "percent" if unit_text == "%" else _written_powers(unit_text.replace("·", "*"))
         names = registry.parse_units_as_container(f"1{known}" if known.startswith("/") else known)
-        given, expected = registry.Unit(names), registry.Unit("" if dimensionless else unit)
+        given = registry.Unit(names)
+        expected = registry.Unit("" if dimensionless else unit)
         if given.dimensionality != expected.dimensionality or (dimensionless and not _ANGLES.isdisjoint(names)):
             raise ValueError(f"in {given}")
-        converted, begins = (float(registry.Quantity(one, given).to(expected).magnitude) for one in (value, 0.0))
+        converted, begins = (
+            float(registry.Quantity(magnitude, given).to(expected).magnitude) for magnitude in (value, 0.0)
+        )
     # pint raises the last two for a unit to the power 0, and letters that are invalid in names
     except (PintError, KeyError, AssertionError) as error:
-        raise ValueError(f"in an unknown unit {found!r}") from error
+        raise ValueError(f"in an unknown unit {unit_text!r}") from error
     if difference and begins:
         raise ValueError(f"a temperature and not a difference of temperatures (such as {f'{value:g} K'!r})")
     return float(f"{converted:.15g}")
@@ -315,7 +323,9 @@ def _prefixed(number: str, found: str, unit: str) -> float | None:
     Most quantities of a study are of this form, and the registry of pint takes 0.2 s to build. A number of at most 15
     digits equals the one of pint rounded to 15 digits.
     """
-    expected, factors, power = unit.split(" "), found.split(" "), 0
+    expected = unit.split(" ")
+    factors = found.split(" ")
+    power = 0
     if len(expected) != len(factors) or not _WITH_PREFIX.issuperset(expected) or len(number) > 15:
         return None
     for name, wanted in zip(factors, expected, strict=True):

@@ -22,7 +22,8 @@ RESULT_FORMAT = 1
 STATUS_MEANINGS = ("converged", "open", "full_contact", "jump")
 
 #: Dimension of the kept times or speeds of cases that do not share them, and number of these in each case.
-ROW, ROWS = "row", "rows"
+ROW = "row"
+ROWS = "rows"
 #: Dimension of all accepted steps.
 STEP = "step"
 #: Dimensions that a result of one case may have in addition to the dimension of its rows.
@@ -60,7 +61,7 @@ class Variable:
     is_panel : bool
         Whether :func:`roughvisc.plot.history` draws it by default.
     is_of_steps : bool
-        Whether a result over time has it at its accepted steps alone, in the group ``steps``.
+        Whether a result over time contains it at its accepted steps alone, in the group ``steps``.
     """
 
     dims: tuple[str, ...]
@@ -114,7 +115,7 @@ _SOLVER = "of the solution on this grid alone: without the errors of the grid an
 _BOTH = "of the grid and of the solver"
 _PERSSON = "by Persson's theory of the same waves"
 _ASPERITIES = "at the rms slope of the surface"
-_NO_ESTIMATE = "if the coarser grid has no solution, or the quantity is zero but for its error"
+_NO_ESTIMATE = "if the coarser grid has no solution, or the quantity is zero within its error"
 _ABSENT = "where the profile is absent"
 _FALLEN = "once the load has fallen"
 _CUT_OFF = "without an upper limit"
@@ -264,7 +265,10 @@ VARIABLES: dict[str, Variable] = {
         missing=_CUT_OFF,
     ),
     "friction_force_error": Variable(
-        _SERIES, "N", "stated error of the friction force", "of steps of one cell; over speed stated_error of it"
+        _SERIES,
+        "N",
+        "stated error of the friction force",
+        "of steps of one cell; over speed stated_error times friction",
     ),
     "grid_error": Variable(
         _SERIES,

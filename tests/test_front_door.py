@@ -1,8 +1,12 @@
 """What a user meets first: the public names, and arguments that are text with a unit."""
 
+import ast
 import inspect
+import operator
+import re
 import subprocess
 import sys
+import textwrap
 from functools import partial
 
 import numpy as np
@@ -33,6 +37,51 @@ def test_completion__is_whole_before_anything_is_used():
     code = "import roughvisc; print(*dir(roughvisc))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == dir(rv)
+
+
+def public():
+    """Every public function and class, once, under the name that a user writes."""
+    names = {}
+    for module in (rv, rv.plot, rv.observables, rv.closed_forms, rv.materials, rv.surfaces):
+        for name in set(dir(module)) - {"__version__"}:
+            value = getattr(module, name)
+            if not inspect.ismodule(value):
+                names.setdefault(value, f"{module.__name__}.{name}")
+    return names
+
+
+def raises_on_its_own(value):
+    """Whether the code of a function, or of a class apart from its methods, raises InputError."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(inspect.unwrap(value))))
+    body = [one for one in ast.walk(tree) if isinstance(one, ast.Raise) and one.exc is not None]
+    return not inspect.isclass(value) and any("InputError" in ast.unparse(one) for one in body)
+
+
+def test_docstring__has_an_example_its_relatives_and_its_errors():
+    """The examples are run by the collection of doctests."""
+    missing = {}
+    for value, name in public().items():
+        text = inspect.getdoc(value)
+        is_error = inspect.isclass(value) and issubclass(value, rv.RoughviscError)
+        sections = ["Examples", "See Also"]
+        if (
+            not is_error
+            and inspect.signature(value).parameters
+            and (inspect.isclass(value) or raises_on_its_own(value))
+        ):
+            sections.append("Raises")
+        lacking = [one for one in sections if f"{one}\n{'-' * len(one)}" not in text]
+        lacking += ["an example that runs"] if "+SKIP" in text else []
+        if lacking:
+            missing[name] = lacking
+    assert not missing
+
+
+def test_docstring__names_relatives_that_exist():
+    for value, name in public().items():
+        related = inspect.getdoc(value).partition("See Also\n--------\n")[2].partition("\n\n")[0]
+        for dotted in re.findall(r"roughvisc\.([\w.]+)", related):
+            assert operator.attrgetter(dotted)(rv) is not value, f"{name}: {dotted}"
 
 
 WAVE = rv.wavy("1 um", "1 mm", ("1 mm", "0.1 mm"), (24, 3), waves=1)
@@ -94,6 +143,35 @@ def test_wrong_type__is_refused_at_the_argument(function, arguments):
             with pytest.raises(rv.InputError) as caught:
                 function(**{**arguments, name: wrong})
             assert caught.value.key.partition("[")[0].partition(".")[0] == name, wrong
+
+
+def test_case__has_the_settings_of_simulate():
+    case, simulate = (list(inspect.signature(one).parameters.values()) for one in (rv.Case, rv.simulate))
+    own = {"surface", "program", "title", "observe", "audit"}
+    of_simulate = [one for one in simulate if one.name not in ("height", "program", "threads", "progress")]
+    assert [str(one) for one in case if one.name not in own] == [str(one) for one in of_simulate]
+
+
+SMALL = rv.Case(rv.sphere(1e-3, 2e-4, 9), rv.elastic(1e6), rv.Program().load(1e-6, over=0), title="small")
+
+
+@pytest.mark.parametrize("wrong", [-1, "2", 1.5, True])
+@pytest.mark.parametrize("name", ["workers", "threads"])
+def test_number_of_processes_or_threads__is_refused_at_the_argument(name, wrong, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    functions = [rv.run, rv.sweep, rv.plan, rv.trade, rv.budget, rv.audit, rv.report, rv.simulate]
+    for function in functions:
+        parameters = inspect.signature(function).parameters
+        if name in parameters:
+            given = {
+                rv.sweep: ([SMALL],),
+                rv.report: (WAVE.to_dataset(name="height"), "page.html"),
+                rv.simulate: (WAVE, RUBBER, PRESS),
+            }.get(function, (SMALL,))
+            quiet = {"progress": False} if "progress" in parameters else {}
+            with refused(name, wrong):
+                function(*given, **quiet, **{name: wrong})
+    assert not list(tmp_path.rglob("*.nc"))
 
 
 def test_missing_argument__names_the_function():

@@ -1,4 +1,4 @@
-"""What a contributor touches: a new setting and a new variable two files, a material and a conditioning step one.
+"""What a contributor touches: a new setting three files, a variable and a material two, a conditioning step one.
 
 The test adds one of each to a copy of the package, and uses it as a user would. The variable is that of the guide.
 """
@@ -19,10 +19,16 @@ ADDED = {
             "    edge: Edge = Settings.edge,\n": "    suction: float = 0.0,\n",
             '        "edge": edge,\n': '        "suction": suction,\n',
         },
+        "study/case.py": {
+            "        edge: Edge = Settings.edge,\n": "        suction: float = 0.0,\n",
+            "            edge=edge,\n": "            suction=suction,\n",
+        },
     },
     "conditioning step": {
         "topography/conditioning.py": {
-            "STEPS: dict[str, Step] = {\n": '    "raised": Step(lambda h, by: h.copy(data=h.values + by), "by"),\n'
+            "STEPS: dict[str, ConditioningStep] = {\n": (
+                '    "raised": ConditioningStep(lambda h, by: h.copy(data=h.values + by), "by"),\n'
+            )
         }
     },
     "material": {
@@ -36,7 +42,11 @@ def gel(modulus: Quantity, drainage: Quantity) -> Prony:
     \"\"\"Gel that is twice as compliant after its drainage.\"\"\"
     return Prony(glassy=1 / modulus, compliances=(1 / modulus,), times=(drainage,))
 """,
-        }
+        },
+        "materials.py": {
+            "from roughvisc.mechanics.layer import layer\n": "from roughvisc.mechanics.materials import gel\n",
+            '    "from_relaxation",\n': '    "gel",\n',
+        },
     },
 }
 STUDY = """
@@ -63,6 +73,8 @@ import numpy as np, roughvisc as rv
 case = rv.read_study("study.toml")
 assert case.settings.suction == 3.0
 assert rv.vary(case, {"solve.suction": 4.0}).key != case.key
+assert case.material == rv.gel("1 MPa", "0.1 s") == rv.materials.gel(1e6, 0.1)
+assert rv.Case(case.height(), case.material, case.program, boundary="free", suction=3.0).settings.suction == 3.0
 assert case.material == rv.Prony(glassy=1e-6, compliances=(1e-6,), times=(0.1,))
 again = rv.Case.from_json(case.to_json())
 assert (again.material, again.settings) == (case.material, case.settings)
@@ -97,15 +109,15 @@ def guide(part):
     return changes
 
 
-def test_setting_variable_step_and_material__are_added_in_two_files_or_one(tmp_path):
+def test_setting_variable_step_and_material__are_added_in_few_files(tmp_path):
     changes = guide("A variable")
     ((_, test),) = changes.pop("tests/experiment/test_rows.py").items()
     variable = {file.removeprefix("roughvisc/"): lines for file, lines in changes.items()}
     added = ADDED | {"variable": variable}
     assert {what: len(edits) for what, edits in added.items()} == {
-        "setting": 2,
+        "setting": 3,
         "conditioning step": 1,
-        "material": 1,
+        "material": 2,
         "variable": 2,
     }
     shutil.copytree(PACKAGE, tmp_path / "roughvisc", ignore=shutil.ignore_patterns("__pycache__"))

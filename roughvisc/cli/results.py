@@ -165,11 +165,11 @@ def verify(results: Path) -> None:
     """
     from roughvisc.runs.netcdf import verify as verified
 
-    found = verified(results)
-    bad = [flaw for flaw in found.values() if flaw]
+    damage = verified(results)
+    bad = [flaw for flaw in damage.values() if flaw]
     for flaw in bad:
         complain(flaw)
-    click.echo(f"{len(found) - len(bad)} of {counted(len(found), 'file')} intact")
+    click.echo(f"{len(damage) - len(bad)} of {counted(len(damage), 'file')} intact")
     if bad:
         raise Failure(f"{counted(len(bad), 'file')} damaged or not readable", 1)
 

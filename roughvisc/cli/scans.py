@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 def _sides(text: str) -> Any:
     """Return one length, or two separated by a comma."""
-    sides = tuple(part.strip() for part in text.split(","))
+    sides = tuple(side.strip() for side in text.split(","))
     return sides[0] if len(sides) == 1 else sides
 
 
@@ -122,17 +122,17 @@ def scan(file: Path, plot: Path | None, to: Path | None, card: Path | None, **op
             raise InputError(f"{out}: already exists: expected another name")
     with sign_of_life("inspects the scan"):
         levelled = rv.level(height)
-        found = inspection_of(height)
+        inspection = inspection_of(height)
         measures = rv.parameters(levelled)
-    text = card_text(file, card.parent, options, found.steps) if card else ""
+    text = card_text(file, card.parent, options, inspection.steps) if card else ""
     console = screen()
-    console.print(scan_table(height, measures, file.name), "", findings_table(found), "", sep="\n")
-    say(console, surface_table(file, Path(), options, found.steps))
+    console.print(scan_table(height, measures, file.name), "", findings_table(inspection), "", sep="\n")
+    say(console, surface_table(file, Path(), options, inspection.steps))
     if is_replaced or not picture.exists():
         say_path(
             console,
             "Picture",
-            write_figure(rv.plot.surface(levelled, cutoff=found.steps.get("filter")), picture, _MAKER),
+            write_figure(rv.plot.surface(levelled, cutoff=inspection.steps.get("filter")), picture, _MAKER),
         )
     else:
         say_path(console, "Picture kept, because roughvisc scan did not make it", picture)
@@ -171,7 +171,7 @@ def new(file: Path | None, out: Path | None, contact: str, **options: Any) -> No
     from roughvisc.topography.inspection import inspection_of
     from roughvisc.units import number
 
-    part = number(contact, "1", "contact", above=0, below=1)
+    fraction = number(contact, "1", "contact", above=0, below=1)
     source = file or Path(EXAMPLE)
     out = out or Path(f"{source.stem}-study.toml")
     if out.suffix.lower() != ".toml" or out.exists():
@@ -184,13 +184,13 @@ def new(file: Path | None, out: Path | None, contact: str, **options: Any) -> No
             temporary.write_bytes(shipped)
     height = _opened(source, options)
     with sign_of_life("inspects the scan"):
-        found = inspection_of(height)
-        first = first_pressure(height, found, part)
-    write_text(out, starter_study(source, out, options, found, first))
+        inspection = inspection_of(height)
+        first = first_pressure(height, inspection, fraction)
+    write_text(out, starter_study(source, out, options, inspection, first))
     if first.miss:
         complain(f"warning: {first.miss}")
     console = screen()
-    console.print(findings_table(found), "", sep="\n")
+    console.print(findings_table(inspection), "", sep="\n")
     if file is None:
         say_path(console, "Scan", source)
     say_path(console, "Study", out)

@@ -102,7 +102,8 @@ def run(
         cases = [rv.vary(case, {"solve.device": device}).with_fields(varied=case.varied) for case in cases]
     if targets and len(cases) > 1:
         raise InputError(key="for", found=targets[0], expected=f"one case, and {study} has {len(cases)}")
-    folder, console = result_folder(cases[0], out), screen(quiet)
+    folder = result_folder(cases[0], out)
+    console = screen(quiet)
     remote = [settings.pop(name) for name in ("scheduler", "scheduler_file")]
     with connect(*remote) if any(remote) else nullcontext() as client:
         if targets:
@@ -163,14 +164,14 @@ def parse_targets(texts: Sequence[str]) -> dict[str, str]:
     from roughvisc.judge.budget import QUANTITIES  # slow to import
     from roughvisc.units import is_quantity
 
-    found: dict[str, str] = {}
+    targets: dict[str, str] = {}
     for text in texts:
         amount, _, name = text.strip().rpartition(" ")
-        if name not in QUANTITIES or name in found or not is_quantity(amount, "1"):
+        if name not in QUANTITIES or name in targets or not is_quantity(amount, "1"):
             expected = f"a target such as '1 % contact_area', once for each number, of {', '.join(QUANTITIES)}"
             raise InputError(key="for", found=text, expected=expected)
-        found[name] = amount
-    return found
+        targets[name] = amount
+    return targets
 
 
 def _chosen(
@@ -221,8 +222,9 @@ def _run_all(cases: list[Case], folder: Path, console: Console, *, client: Any, 
     from roughvisc.runs.sweep import run_study
     from roughvisc.runs.sweep_data import numbers_of, sweep_cases
 
-    found = run_study(cases, folder, client=client, display=Display(not console.quiet, console), **computing)
-    outcomes, numbers = list(found.values()), numbers_of(sweep_cases(cases))
+    outcome_of_key = run_study(cases, folder, client=client, display=Display(not console.quiet, console), **computing)
+    outcomes = list(outcome_of_key.values())
+    numbers = numbers_of(sweep_cases(cases))
     console.print(sweep_table(outcomes, len(cases), cases[0].title))
     for what, path in (("Results", folder), ("Table of cases", folder / CASES), ("Log", folder / LOG)):
         say_path(console, what, path)
@@ -258,11 +260,12 @@ def trade(study: Path, out: Path | None, accuracy: str, quantity: str | None, qu
     from roughvisc.runs.run import result_folder
     from roughvisc.units import number
 
-    part = number(accuracy, "1", "accuracy", above=0, below=1)
-    case, console = rv.read_study(study), screen(quiet)
+    error = number(accuracy, "1", "accuracy", above=0, below=1)
+    case = rv.read_study(study)
+    console = screen(quiet)
     folder = out or result_folder(case) / FOLDER
     dataset = rv.trade(case, quantity=quantity or (), out=folder, progress=not quiet)
-    console.print(trade_table(dataset, str(dataset["quantity"].values[0]), part))
+    console.print(trade_table(dataset, str(dataset["quantity"].values[0]), error))
     _write(console, "Trade", dataset, folder / "trade.nc", rv.plot.trade)
 
 
@@ -300,9 +303,9 @@ def budget(study: Path, out: Path | None, workers: int | None, quiet: bool, **kn
     names = list(known.pop("quantity")) or ["contact_area"]
     case = rv.read_study(study)
     folder = out or result_folder(case) / FOLDER
-    found = rv.budget(case, names, **known, out=folder, workers=workers, progress=not quiet)
+    uncertainties = rv.budget(case, names, **known, out=folder, workers=workers, progress=not quiet)
     for name in names:
-        _show_budget(screen(quiet), found.sel(quantity=name), folder, name)
+        _show_budget(screen(quiet), uncertainties.sel(quantity=name), folder, name)
 
 
 def _show_budget(console: Console, found: xr.Dataset, folder: Path, name: str, plots: bool = True) -> None:

@@ -37,7 +37,7 @@ def audit_table(audit: Audit) -> Group:
         Result of :func:`roughvisc.audit`.
     """
     headings = ("assumption", "verdict", "number", "reason")
-    rows = [(one.name, one.verdict, one.shown, _by_option(one.sentence)) for one in audit]
+    rows = [(finding.name, finding.verdict, finding.shown, _by_option(finding.sentence)) for finding in audit]
     return titled(audit.title, columns(headings, rows, ("assumption", "verdict", "reason")))
 
 
@@ -74,7 +74,7 @@ def budget_table(dataset: xr.Dataset) -> Group:
 
 def _by_option(sentence: str) -> str:
     """Return a sentence with a missing input named as the option of the command, if it has one."""
-    options = {one.name: one.opts[0] for one in click.get_current_context().command.params}
+    options = {parameter.name: parameter.opts[0] for parameter in click.get_current_context().command.params}
     return re.sub(r"\w+(?= is not given)", lambda found: options.get(found[0], found[0]), sentence)
 
 
@@ -111,14 +111,15 @@ def trade_table(dataset: xr.Dataset, quantity: str, target: float) -> Group:
         row = dataset.isel(setting=i)
         mark = (">" if i == chosen else "") + ("*" if best[i] else "")
         name = str(row["setting"].values)
-        errors = [_percent(float(row["error"].sel(quantity=one))) for one in shown]
+        errors = [_percent(float(row["error"].sel(quantity=quantity_shown))) for quantity_shown in shown]
         cost = f"{float(row['run_time']):.2g} s", f"{float(row['transforms']):.0f}"
         rows.append((mark, name.replace(", ", ",\n"), *cost, *errors))
     headings = ("", "setting", "time", "FFTs", *(name.replace("_", "\n") for name in shown))
     words = VARIABLES[quantity].label.lower()
     wanted = f"{_percent(target)} %"
     by_steps, by_grid = (
-        _percent(float(dataset[f"reference_{part}_uncertainty"].sel(quantity=quantity))) for part in ("time", "grid")
+        _percent(float(dataset[f"reference_{source}_uncertainty"].sel(quantity=quantity)))
+        for source in ("time", "grid")
     )
     grid = "spacing of the surface points" if dataset.attrs["grid_is_data"] else "grid"
     lines = [

@@ -90,7 +90,9 @@ def percent(part: float) -> str:
 
 def worst_error(found: Iterable[Any]) -> str:
     """Return the largest known stated error of some results as text."""
-    errors = np.concatenate([[-np.inf], *(np.ravel(one["stated_error"]) for one in found if "stated_error" in one)])
+    errors = np.concatenate(
+        [[-np.inf], *(np.ravel(result["stated_error"]) for result in found if "stated_error" in result)]
+    )
     largest = np.max(errors, where=np.isfinite(errors), initial=-np.inf)
     return percent(largest) if largest >= 0 else "not known"
 
@@ -144,7 +146,7 @@ def sweep_table(outcomes: Sequence[Outcome], total: int, title: str) -> Group:
         *((kind.capitalize(), count) for kind, count in kinds.items()),
         ("Accuracy: worst stated error", worst_error(entry.arrays for entry in finished)),
         ("Accuracy: worst grid error", grid_error_of(entry.arrays for entry in finished)),
-        ("Cost: total wall time", readable(sum(one.seconds for one in outcomes if not one.reused), "s")),
+        ("Cost: total wall time", readable(sum(ended.seconds for ended in outcomes if not ended.reused), "s")),
     ]
     return two_columns(rows, title)
 
@@ -182,5 +184,7 @@ def scan_table(height: xr.DataArray, measures: xr.Dataset, name: str) -> Group:
 
 def findings_table(found: Inspection) -> Group:
     """Return the findings in a scan, each with its recommendation."""
-    rows = [(name, f"{one.seen}\n-> {one.advice or 'no action needed'}") for name, one in found.findings.items()]
+    rows = [
+        (name, f"{finding.seen}\n-> {finding.advice or 'no action needed'}") for name, finding in found.findings.items()
+    ]
     return two_columns(rows, "Findings and recommendations")

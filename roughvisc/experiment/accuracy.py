@@ -33,7 +33,8 @@ from roughvisc.variables import VARIABLES
 Array = NDArray[np.float64]
 #: Errors inherited from the contact solver in earlier steps, over its largest error so far: of the pressure, and of the
 #: approach.
-INHERITED, INHERITED_APPROACH = 0.25, 0.06
+INHERITED = 0.25
+INHERITED_APPROACH = 0.06
 #: Least stated error of the pressure of an elastic body, over the tolerance. Measured on the same rows.
 LEAST = 0.015
 #: Error of the work of an elastic body due to the contact solver, over its error of the pressure times the largest
@@ -41,7 +42,7 @@ LEAST = 0.015
 #: displacement ``u`` of a contact cell lies between zero and the approach. Under a given load the integral of ``dp``
 #: vanishes, so ``u`` may count from half the approach.
 OF_WORK = {"approach": 1.0, "load": 0.5}
-#: The same of a body with memory, whose work is an integral over steps with independent errors.
+#: The same for a body with memory, whose work is an integral over steps with independent errors.
 OF_WORK_OF_STEPS = 0.2
 #: Error of the pressure at the edge of contact, over the mean error of the pressure.
 SOLVER_AT_EDGE = 3.0
@@ -85,7 +86,8 @@ def shortest_age(program: Program, settings: Settings) -> float:
     tenth of the tolerance this equals the error allowed at longer ages. No step is shorter than a millionth of a
     segment, so a smaller ``f`` is not needed.
     """
-    shortest, kept = math.inf, kept_times(program, settings.times)
+    shortest = math.inf
+    kept = kept_times(program, settings.times)
     for segment in program.segments:
         if segment.duration > 0:
             shortest = min(shortest, segment.duration, segment.period)
@@ -94,26 +96,28 @@ def shortest_age(program: Program, settings: Settings) -> float:
     elif kept is None:
         shortest *= SHORTEST_PAIR
     else:
-        corners, times = np.array(program.corners), np.array(kept)
+        corners = np.array(program.corners)
+        times = np.array(kept)
         after = np.searchsorted(times, corners, side="right")
-        corners, after = corners[after < times.size], after[after < times.size]
+        corners = corners[after < times.size]
+        after = after[after < times.size]
         shortest = min(shortest, float(np.min(times[after] - corners, initial=math.inf)))
         shortest *= max(SERIES_SHARE * settings.tolerance, SHORTEST_PAIR)
     return shortest
 
 
 def series_of_run(material: Material, program: Program, settings: Settings) -> Prony:
-    """Return the series that a run uses in place of a creep function, with the error of the series."""
+    """Return the series that replaces a creep function in a run, with the error of the series."""
     memory = memory_of(Body(material), program, settings)
-    found = memory.series
+    series = memory.series
     if not memory.series_error:
-        return found
+        return series
     return creep_series(
-        found.glassy,
-        found.fluidity,
-        found.compliances,
-        found.times,
-        found.poisson,
+        series.glassy,
+        series.fluidity,
+        series.compliances,
+        series.times,
+        series.poisson,
         error=memory.series_error,
         shortest=memory.shortest,
         longest=program.duration,
@@ -143,18 +147,22 @@ def error_columns(step: Step, scene: Scene) -> dict[str, float]:
     values of the kept rows so far and of the step. Errors of the series and of the work are relative to the largest
     values of all steps: values left after unloading are differences of large values. Errors of the work add up.
     """
-    point, state, error = step.point, step.state, step.difference
+    point = step.point
+    state = step.state
+    error = step.difference
     control = scene.program.segments[step.segment].control
-    given, remembers = scene.program.prescribes[step.segment], not scene.memory.is_elastic
-    largest_force, largest_approach = max(state.kept_force, point.size), max(state.kept_approach, abs(point.approach))
+    given = scene.program.prescribes[step.segment]
+    remembers = not scene.memory.is_elastic
+    largest_force = max(state.kept_force, point.size)
+    largest_approach = max(state.kept_approach, abs(point.approach))
     series_error = scene.memory.series_error  # from the shortest known age on
     loaded = max(state.largest_force, point.size, 1e-300)
     reached = max(state.largest_approach, abs(point.approach), 1e-300)
     age = point.time - scene.program.corners[step.segment]
     if age > 0 and scene.memory.early > 0:
         change = (point.force - point.start) / loaded if control == "load" else (point.approach - point.start) / reached
-        part = 1.0 if age < scene.memory.shortest else min(abs(change), 1.0)
-        series_error += part * scene.memory.error_of_young(age)
+        share = 1.0 if age < scene.memory.shortest else min(abs(change), 1.0)
+        series_error += share * scene.memory.error_of_young(age)
     of_force = series_error * loaded
     if remembers:
         solved = point.solver_error + INHERITED * state.solver_error
@@ -171,7 +179,8 @@ def error_columns(step: Step, scene: Scene) -> dict[str, float]:
         approach += INHERITED_APPROACH * state.solver_error * reached if remembers else 0.0
     stepped = error.pressure + error.shared
     pressure = (stepped + solved * point.size + of_force) / largest_force if largest_force > 0 else solved
-    per_force, per_approach = largest_force or math.inf, largest_approach or math.inf
+    per_force = largest_force or math.inf
+    per_approach = largest_approach or math.inf
     return {
         "time_error": max(stepped / per_force, error.force / per_force, error.approach / per_approach),
         "stated_error": max(pressure, force / per_force, approach / per_approach),
@@ -383,13 +392,16 @@ def wakes_of(scene: Scene, profile: Profile, pressure: Array | None) -> str:
     pressure : ndarray, shape (nx, ny), or None
         Pressure at the last kept time, if kept. [Pa]
     """
-    wakes, end = [], scene.program.duration
+    wakes = []
+    end = scene.program.duration
     for axis in (0, 1):
         period = profile.height.shape[axis] * profile.spacing[axis]
-        path, left = 0.0, dict[float, float]()
+        path = 0.0
+        left = dict[float, float]()
         for segment in scene.program.segments:
             if segment.slide is not None and segment.slide.axis == axis:
-                path, speed = path + segment.slide.distance, segment.slide.distance / segment.duration
+                path = path + segment.slide.distance
+                speed = segment.slide.distance / segment.duration
                 crept = scene.memory.compliance(min(period / speed, end))
                 left[speed] = 1.0 - crept / scene.memory.compliance(end)
         # on a shorter path the contact does not reach the wake of its neighbour
@@ -408,7 +420,7 @@ def wake_warning(left: Mapping[float, float], period: float) -> str:
     period : float
         Period along the motion. [m]
     """
-    speeds = sorted(speed for speed, part in left.items() if part >= _LEFT)
+    speeds = sorted(speed for speed, share in left.items() if share >= _LEFT)
     if not speeds:
         return ""
     slowest = format_quantity(speeds[0], "m/s")

@@ -51,7 +51,8 @@ _ONE_COARSER_USUAL = 3.0, 1.5
 #: The area of a sliding contact converges more slowly than the area of a contact at rest.
 _MOVING = {"contact_area": (1.0, 1.0)}
 #: Roache's safety factors: with three grids, and with two.
-_THREE, TWO_GRIDS = 1.25, 3.0
+_THREE = 1.25
+TWO_GRIDS = 3.0
 
 
 def grid_uncertainty(name: str, near: ArrayLike, far: ArrayLike, ratio: float, *, moving: bool = False) -> Array:
@@ -81,7 +82,8 @@ def grid_uncertainty(name: str, near: ArrayLike, far: ArrayLike, ratio: float, *
     ----------
     .. [1] P. J. Roache, Annu. Rev. Fluid Mech. 29 (1997) 123.
     """
-    near, far = np.asarray(near, dtype=float), np.asarray(far, dtype=float)
+    near = np.asarray(near, dtype=float)
+    far = np.asarray(far, dtype=float)
     usual = ORDERS.get(name, _USUAL)
     lowest, expected = _MOVING.get(name, usual) if moving else usual
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -97,7 +99,8 @@ Mask = NDArray[np.bool_]
 #: Largest error of the pressure (L1) per unit force on cells at the edge of the contact. The first is for edges on the
 #: material (measured 0.2 in the median, 0.5 in 5 % of the cases), the second for edges of the material, where the
 #: pressure is infinite. If the edge carries all of the force, the pressure is unknown.
-_AT_EDGE, _AT_END = 0.45, 0.9
+_AT_EDGE = 0.45
+_AT_END = 0.9
 #: Error of the number of contact cells over the square root of the number of faces at the edge of the contact, since
 #: the edge lies at random between the cells. Each mirror symmetry of the contact doubles the same error.
 _COUNTING = 0.5
@@ -105,7 +108,7 @@ _COUNTING = 0.5
 #: cell centres may be wider than one cell. At 0.999 of the pressure of full contact the hidden area is 2.3 times the
 #: open area of a wave on 64 cells, and 4.7 times the open area on 32 cells.
 _HIDDEN = 1.5
-#: Size that stands for zero in a ratio.
+#: Size that counts as zero in a ratio.
 _ZERO = 1e-300
 #: Approaches of both grids that differ by less than this part of the largest approach were prescribed.
 _GIVEN = 1e-12
@@ -174,8 +177,8 @@ def with_grid_error(
             for name in ("force", "contact_area")
         )
         pressures.append(force.over(area))
-    most = np.fmax.reduce([one.value for one in pressures], initial=_ZERO)
-    errors[VARIABLES["mean_contact_pressure"].grid_error] = np.array([one.error / most for one in pressures])
+    most = np.fmax.reduce([pressure.value for pressure in pressures], initial=_ZERO)
+    errors[VARIABLES["mean_contact_pressure"].grid_error] = np.array([pressure.error / most for pressure in pressures])
     return dataset.assign({name: ("time", values) for name, values in errors.items()})
 
 
@@ -223,10 +226,10 @@ def hidden_peak(height: Array, periodic: bool) -> float:
         Whether the surface repeats.
     """
     beyond: Any = "wrap" if periodic else "clip"
-    at = np.unravel_index(int(np.nanargmax(height)), height.shape)
-    lines = (height[:, at[1]], height[at[0]])
-    lowest = (np.fmin.reduce(line.take([i - 1, i, i + 1], mode=beyond)) for line, i in zip(lines, at, strict=True))
-    return float(sum(height[at] - low for low in lowest)) / 2
+    highest = np.unravel_index(int(np.nanargmax(height)), height.shape)
+    lines = (height[:, highest[1]], height[highest[0]])
+    lowest = (np.fmin.reduce(line.take([i - 1, i, i + 1], mode=beyond)) for line, i in zip(lines, highest, strict=True))
+    return float(sum(height[highest] - low for low in lowest)) / 2
 
 
 def _least_errors(
@@ -249,19 +252,27 @@ def _least_errors(
     """
     here = {name: float(dataset[name][row]) for name in ("force", "approach", "contact_area", "contact_area_counted")}
     wide = largest["mean_gap"]
-    force, area = here["force"] / largest["force"], here["contact_area"] / largest["contact_area"]
+    force = here["force"] / largest["force"]
+    area = here["contact_area"] / largest["contact_area"]
 
     # The peak: under a given approach the gap is too wide by its height. Force and area grow with the square of the
     # approach under a cone, and with lower powers under a ball. Under a given load the approach is too small.
     depth = abs(here["approach"])
-    part = 2 * peak / max(depth, peak or 1.0) if given and depth > 0 else 0.0
-    least = {"pressure": part * force, "force": part * force, "contact_area": part * area}
+    share_of_approach = 2 * peak / max(depth, peak or 1.0) if given and depth > 0 else 0.0
+    least = {
+        "pressure": share_of_approach * force,
+        "force": share_of_approach * force,
+        "contact_area": share_of_approach * area,
+    }
     least |= {"approach": 0.0 if given else peak / largest["approach"], "mean_gap": peak / wide if given else 0.0}
 
-    pressure, height = dataset["pressure"].values[row], dataset["height"].values
-    contact, present = pressure > 0, np.isfinite(height)
+    pressure = dataset["pressure"].values[row]
+    height = dataset["height"].values
+    contact = pressure > 0
+    present = np.isfinite(height)
     if "adhesive_force" in dataset:
-        contact, pressure = dataset["gap"].values[row] == 0, np.abs(pressure)
+        contact = dataset["gap"].values[row] == 0
+        pressure = np.abs(pressure)
     if not contact.any():
         return least
     # Full contact on this grid may hide small openings.
@@ -278,8 +289,8 @@ def _least_errors(
     least["pressure"] = max(least["pressure"], unknown * force)
     least["contact_area"] = max(least["contact_area"], counting_error(contact, faces + outline) * counted)
     # The edge of the material: a wider punch sinks in less, or carries more.
-    found = "force" if given else "approach"
-    least[found] = max(least[found], counting_error(contact, ends))
+    solved_for = "force" if given else "approach"
+    least[solved_for] = max(least[solved_for], counting_error(contact, ends))
     return least
 
 
@@ -311,15 +322,16 @@ def hidden_opening(pressure: Array, height: Array, periodic: bool) -> tuple[floa
     present = np.isfinite(height)
     if not (pressure[present] > 0).all():
         return 0.0, 0.0
-    at = np.unravel_index(int(np.argmin(np.where(present, pressure, math.inf))), pressure.shape)
+    lowest = np.unravel_index(int(np.argmin(np.where(present, pressure, math.inf))), pressure.shape)
     beyond: dict[str, Any] = {"mode": "wrap"} if periodic else {"constant_values": math.nan}
-    beside = at[0] + np.array([0, 2, 1, 1]), at[1] + np.array([1, 1, 0, 2])  # counted from the cells beyond the border
-    changes = np.pad(np.where(present, pressure, math.nan), 1, **beyond)[beside] - pressure[at]
-    steps = np.pad(height, 1, **beyond)[beside] - height[at]
+    # counted from the cells beyond the border
+    beside = (lowest[0] + np.array([0, 2, 1, 1]), lowest[1] + np.array([1, 1, 0, 2]))
+    changes = np.pad(np.where(present, pressure, math.nan), 1, **beyond)[beside] - pressure[lowest]
+    steps = np.pad(height, 1, **beyond)[beside] - height[lowest]
     if np.isnan(changes).all():
         return 0.0, 0.0
-    part = _HIDDEN * np.count_nonzero(pressure[present] <= np.nanmax(changes)) / np.count_nonzero(present)
-    return part, part * float(np.nanmax(np.abs(steps)))
+    share = _HIDDEN * np.count_nonzero(pressure[present] <= np.nanmax(changes)) / np.count_nonzero(present)
+    return share, share * float(np.nanmax(np.abs(steps)))
 
 
 def counting_error(contact: Mask, faces: int) -> float:
@@ -334,8 +346,11 @@ def _edge(contact: Mask, present: Mask, boundary: Boundary) -> tuple[Mask, Mask,
     The faces are those to free cells, those at the edge of the material, and those of the last to absent cells. The
     others lie at the border of the grid, whose place is known.
     """
-    at_edge, at_end = np.zeros_like(contact), np.zeros_like(contact)
-    faces, ends, outline = 0, 0, 0
+    at_edge = np.zeros_like(contact)
+    at_end = np.zeros_like(contact)
+    faces = 0
+    ends = 0
+    outline = 0
     around = (neighbours(mask, boundary) for mask in (present & ~contact, present, ~present))
     for free, material, absent in zip(*around, strict=True):
         at_edge |= contact & free

@@ -51,7 +51,7 @@ from roughvisc.variables import STATUS_MEANINGS
 log = logging.getLogger("roughvisc")
 Array = NDArray[np.float64]
 
-#: Largest stated error, over the tolerance, of a step that is kept because its error is small. Such a choice favours
+#: Largest stated error, over the tolerance, of a step that is kept because its error is small. This choice favours
 #: steps whose stated error is too small. With 1 instead of 0.5, a third more steps are kept, but 9 instead of 4 % of
 #: 185 random cases have a row beyond the tolerance.
 CHOSEN = 0.5
@@ -120,7 +120,9 @@ class Loading(Experiment):
 
     def rows(self, problem: Problem, state: LoadingState | None = None, *, in_memory: bool = True) -> LoadingRows:
         """Return all accepted steps, from rest or a state; the kept ones are rows of the result."""
-        height, body, settings = problem.height, problem.body, problem.settings
+        height = problem.height
+        body = problem.body
+        settings = problem.settings
         xp = arrays_of(settings.device)
         if height.size >= WORTH_ASKING:
             require_loading((height.sizes["x"], height.sizes["y"]), self.program, settings, body, in_memory)
@@ -250,8 +252,11 @@ class LoadingRows(Rows):
         EdgeContactError
             If contact reaches the border of another free surface, unless the settings accept it.
         """
-        scene, domain = self.scene, self.domain
-        every, ends, is_free = scene.kept is None, set(scene.program.corners), scene.grid.boundary == "free"
+        scene = self.scene
+        domain = self.domain
+        every = scene.kept is None
+        ends = set(scene.program.corners)
+        is_free = scene.grid.boundary == "free"
         for step in march(scene, self.state.march):
             point = step.point
             if is_free and not point.is_open:
@@ -287,7 +292,8 @@ class LoadingRows(Rows):
 
     def _reach_border(self, time: float) -> None:
         """Record that contact reaches the border of a free surface, enlarge an indenter, or refuse the contact."""
-        state, (nx, ny) = self.state, self.profile.gap.shape
+        state = self.state
+        nx, ny = self.profile.gap.shape
         if self.problem.settings.edge == "accept":
             self.state = state if state.border is not None else replace(state, border=time)
             return
@@ -317,17 +323,26 @@ class LoadingRows(Rows):
         jumps : bool
             Whether the contact of an elastic body with adhesion jumps to another state in the step.
         """
-        scene, profile, domain, point = self.scene, self.profile, self.domain, step.point
-        grid, present, is_whole, xp = scene.grid, scene.present, domain.is_whole, scene.grid.xp
-        displaced, pressure = scene.memory.displacement(point.history), point.pressure
-        contact, displacement = point.contact, displaced[0]
+        scene = self.scene
+        profile = self.profile
+        domain = self.domain
+        point = step.point
+        grid = scene.grid
+        present = scene.present
+        is_whole = domain.is_whole
+        xp = scene.grid.xp
+        displaced = scene.memory.displacement(point.history)
+        pressure = point.pressure
+        contact = point.contact
+        displacement = displaced[0]
         gap = xp.maximum(scene.gap + displacement - point.approach, 0.0)
         gap[contact] = 0.0
 
         # Counting cells overestimates the area by a part of the strip along the perimeter, where contact ends within
         # the material. If the material itself ends, at an absent cell or at the border of a scan in free space, the
         # edge of the contact is known and the count is exact. A mirror plane is not an edge: cells adjoin their images.
-        free, goes_on = ~contact if present is None else present & ~contact, not is_whole
+        free = ~contact if present is None else present & ~contact
+        goes_on = not is_whole
         counted, area, _ = contact_area(contact, free, grid.cell_area, grid.boundary, goes_on)
 
         is_full = is_whole and not bool(free.any())
@@ -365,7 +380,8 @@ class LoadingRows(Rows):
         if not kept:
             return row, {}
 
-        names, beyond = self.problem.settings.fields, dict[str, Array]()  # fields outside the domain
+        names = self.problem.settings.fields
+        beyond = dict[str, Array]()  # fields outside the domain
         if not is_whole:
             beyond["pressure"] = np.zeros(domain.shape)
             if "displacement" in names or "gap" in names:
@@ -373,8 +389,8 @@ class LoadingRows(Rows):
                 beyond["gap"] = np.maximum(profile.gap + beyond["displacement"] - point.approach, 0.0)
         fields = {}
         for name in names:
-            found = {"pressure": point.stored_pressure, "displacement": displacement, "gap": gap}
-            fields[name] = to_host(found[name])
+            columns = {"pressure": point.stored_pressure, "displacement": displacement, "gap": gap}
+            fields[name] = to_host(columns[name])
             if beyond:
                 beyond[name][domain.cells] = fields[name]
                 fields[name] = beyond[name]
@@ -396,8 +412,11 @@ class LoadingRows(Rows):
         counted, area : float
             Contact area, counted and corrected for the grid. [m2]
         """
-        scene, point, difference = self.scene, step.point, step.difference
-        inside, outside = 0.0, 0.0
+        scene = self.scene
+        point = step.point
+        difference = step.difference
+        inside = 0.0
+        outside = 0.0
         if counted > 0 and point.solver_error > 0:
             off = SOLVER_AT_EDGE * point.solver_error * point.size / counted
             closed = off * scene.grid.self_influence * scene.memory.compliance(length)
@@ -407,8 +426,14 @@ class LoadingRows(Rows):
 
     def finish(self, dataset: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
         """Return the result with the memory model and the cycles, and its warnings."""
-        scene, profile, memory, limit, warnings = self.scene, self.profile, self.scene.memory, self.scene.tolerance, {}
-        boundary, program, errors = scene.grid.boundary, scene.program, dataset["stated_error"].values
+        scene = self.scene
+        profile = self.profile
+        memory = self.scene.memory
+        limit = self.scene.tolerance
+        warnings = {}
+        boundary = scene.grid.boundary
+        program = scene.program
+        errors = dataset["stated_error"].values
         missed = errors[errors > limit]
         if missed.size:
             warnings["tolerance"] = (
@@ -473,9 +498,9 @@ def on_device(value: Any, xp: Any) -> Any:
     if isinstance(value, np.ndarray):
         return xp.asarray(value)
     if isinstance(value, tuple):
-        return tuple(on_device(part, xp) for part in value)
+        return tuple(on_device(inner, xp) for inner in value)
     if isinstance(value, STATES):
-        return replace(value, **{part.name: on_device(getattr(value, part.name), xp) for part in fields(value)})
+        return replace(value, **{field.name: on_device(getattr(value, field.name), xp) for field in fields(value)})
     return value
 
 
@@ -502,7 +527,8 @@ def check_program(profile: Profile, program: Program, boundary: str) -> None:
     # displacement. If cells are absent, the body bulges into them, and every approach has a definite force.
     can_fill = boundary != "free" and profile.all_present and not profile.kernel.transfer(0.0, 0.0) > 0
     for number, (segment, end) in enumerate(zip(program.segments, program.corners[1:], strict=True)):
-        where, shortest = f"program.{number}", min(segment.duration, segment.period)
+        where = f"program.{number}"
+        shortest = min(segment.duration, segment.period)
         least = max(LEAST_ROUNDINGS * math.ulp(end), 1 / LARGEST)
         if segment.duration > 0 and not (least <= shortest and end <= LARGEST):
             resolved = f"a duration of at least {least:.2g} s, which times near {end:g} s resolve"

@@ -177,8 +177,8 @@ def require_loading(shape: tuple[int, int], program: Program, settings: Settings
     rows = times if isinstance(times, int) else len(times)
     rows = rows if in_memory and settings.device == "cpu" else 0  # kept fields are on the host
     is_free = settings.boundary == "free" and settings.edge == "error" and attraction(settings) is None
-    part = 0.0 if is_free and not body.kernel.raises_surface else 1.0  # the domain is not known yet
-    require_memory(shape, partial(march_bytes, settings, memory, rows=rows, part=part), settings.device)
+    share = 0.0 if is_free and not body.kernel.raises_surface else 1.0  # the domain is not known yet
+    require_memory(shape, partial(march_bytes, settings, memory, rows=rows, part=share), settings.device)
 
 
 def require_surface(shape: Any) -> None:

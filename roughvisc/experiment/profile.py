@@ -30,14 +30,17 @@ from roughvisc.topography.recipes import grown, indenter_of
 
 Array = NDArray[np.float64]
 #: Number of cells along the longer side of the grid of the estimate, and tolerance of the estimate.
-ESTIMATED_ON, ESTIMATE_TOLERANCE = 64, 1e-2
+ESTIMATED_ON = 64
+ESTIMATE_TOLERANCE = 1e-2
 #: Factors of the estimated approach and of the approach of a run: the undeformed gap outside the domain must be larger,
 #: because the estimate and the end of a step have errors.
-MARGIN, BEYOND = 1.2, 1.05
+MARGIN = 1.2
+BEYOND = 1.05
 #: Cells around the domain.
 RIM = 1
 #: Least number of cells along the shorter side for which a smaller domain pays, and its largest part of all cells.
-WORTH_CROPPING, LARGEST_PART = 48, 0.8
+WORTH_CROPPING = 48
+LARGEST_PART = 0.8
 #: Factor by which the surface of an indenter grows; and, after contact has outgrown its domain, the factor of the
 #: estimated approach, or of the size of an indenter's contact, for which the next domain is chosen.
 GROWTH = 1.5
@@ -94,13 +97,18 @@ class Profile:
                 f"({row}, {column}): fill it (fill = true in a study, rv.fill in Python), or say missing='absent' "
                 "if there is no material"
             )
-        self.height, self.kernel = height, kernel
-        self.highest, indenter = float(np.nanmax(values)), indenter_of(height)
+        self.height = height
+        self.kernel = kernel
+        self.highest = float(np.nanmax(values))
+        indenter = indenter_of(height)
         self.is_indenter = indenter is not None
         if indenter is not None:
-            sides, apex = np.array(indenter[1]), np.array(indenter[2])
-            x, y = height["x"].values, height["y"].values
-            first, last = np.array([x[0], y[0]]) - sides / 2, np.array([x[-1], y[-1]]) + sides / 2
+            sides = np.array(indenter[1])
+            apex = np.array(indenter[2])
+            x = height["x"].values
+            y = height["y"].values
+            first = np.array([x[0], y[0]]) - sides / 2
+            last = np.array([x[-1], y[-1]]) + sides / 2
             if (first <= apex).all() and (apex <= last).all():
                 self.highest = 0.0
         self.gap = self.highest - values
@@ -204,7 +212,9 @@ def choose_surface(
     reaches_border : bool
         Whether contact is expected at the border of a free surface.
     """
-    body, settings, estimate = problem.body, problem.settings, Estimate()
+    body = problem.body
+    settings = problem.settings
+    estimate = Estimate()
     times = enlarged or 0
     can_adapt = not body.kernel.raises_surface or profile.is_indenter
     if settings.boundary == "free" and settings.edge == "error" and can_adapt:
@@ -215,7 +225,8 @@ def choose_surface(
             profile = Profile(larger, settings.missing, body.kernel)
         estimate = estimated(profile, compliance, program)
         while enlarged is None and estimate.at_border and (larger := grown(profile.height, GROWTH)) is not None:
-            profile, times = Profile(larger, settings.missing, body.kernel), times + 1
+            profile = Profile(larger, settings.missing, body.kernel)
+            times = times + 1
             estimate = estimated(profile, compliance, program)
     shape = profile.gap.shape[0], profile.gap.shape[1]
     domain = Domain((slice(None), slice(None)), shape, profile.spacing, math.inf, profile.kernel)
@@ -240,16 +251,22 @@ def cropped(whole: Domain, profile: Profile, estimate: Estimate, growth: float) 
     growth : float
         Factor of the approach, or of the size of the contact of an indenter.
     """
-    gap, shape, outside, wider, corners = profile.gap, whole.shape, math.inf, 0, estimate.cells
+    gap = profile.gap
+    shape = whole.shape
+    outside = math.inf
+    wider = 0
+    corners = estimate.cells
     is_connected = corners is not None and profile.is_indenter
     if corners is None or not is_connected:
         corners = np.argwhere(gap <= MARGIN * growth * estimate.approach)
     if not corners.size:
         return whole
-    first, last = corners.min(axis=0), corners.max(axis=0)
+    first = corners.min(axis=0)
+    last = corners.max(axis=0)
     if is_connected:
         wider = np.ceil((growth - 1) / 2 * (last - first)).astype(int)
-    first, last = np.maximum(first - wider - RIM, 0), np.minimum(last + wider + RIM + 1, shape)
+    first = np.maximum(first - wider - RIM, 0)
+    last = np.minimum(last + wider + RIM + 1, shape)
     cells = slice(int(first[0]), int(last[0])), slice(int(first[1]), int(last[1]))
     inside = np.zeros(shape, bool)
     inside[cells] = True
@@ -273,12 +290,15 @@ def estimated(profile: Profile, compliance: float, program: Program) -> Estimate
         Loads and approaches.
     """
     stride = math.ceil(max(profile.gap.shape) / ESTIMATED_ON)
-    gap, present = profile.gap[::stride, ::stride], profile.present[::stride, ::stride]
+    gap = profile.gap[::stride, ::stride]
+    present = profile.present[::stride, ::stride]
     if not present.any():
         return Estimate()
-    least, (dx, dy) = float(gap[present].min()), profile.spacing
+    least = float(gap[present].min())
+    dx, dy = profile.spacing
     grid = Grid((gap.shape[0], gap.shape[1]), (stride * dx, stride * dy), "free", kernel=profile.kernel)
-    approach, touches = 0.0, np.zeros(gap.shape, bool)
+    approach = 0.0
+    touches = np.zeros(gap.shape, bool)
     for number, segment in enumerate(program.segments):
         if segment.control == "approach":
             approach = max(approach, segment.end + abs(segment.amplitude) if segment.end else 0.0)
@@ -289,16 +309,17 @@ def estimated(profile: Profile, compliance: float, program: Program) -> Estimate
         pushes.append({"load": program.largest_load * compliance / grid.cell_area})
     for push in pushes:
         try:
-            found = solve_contact(
+            contact = solve_contact(
                 grid, np.ascontiguousarray(gap), tolerance=ESTIMATE_TOLERANCE, present=present, **push
             )
         except ConvergenceError:
             return Estimate()
-        approach = max(approach, found.approach)
-        touches |= found.pressure > 0
+        approach = max(approach, contact.approach)
+        touches |= contact.pressure > 0
     if not touches.any():
         return Estimate(approach)
     places = np.argwhere(touches)
-    first, last = places.min(axis=0), places.max(axis=0)
+    first = places.min(axis=0)
+    last = places.max(axis=0)
     at_border = bool((first == 0).any() or (last == np.array(gap.shape) - 1).any())
     return Estimate(approach, stride * np.array([first - 1, last + 1]), at_border)

@@ -74,7 +74,9 @@ _COUNTING_CAUTION = 1.5
 _MEANINGFUL = 0.1
 # Largest difference between the rise of temperature and the rise by the heat of friction: relative, and in kelvin; and
 # most temperatures that are tried.
-_SAME_RISE, _SAME_TEMPERATURE, _MOST_TEMPERATURES = 1e-3, 0.01, 40
+_SAME_RISE = 1e-3
+_SAME_TEMPERATURE = 0.01
+_MOST_TEMPERATURES = 40
 _MORE_INSTANTANEOUS = "a material with more instantaneous compliance"
 
 
@@ -92,6 +94,10 @@ class SteadySliding(Experiment):
     ------
     InputError
         If a value is invalid, or both or neither of load and pressure are given.
+
+    See Also
+    --------
+    roughvisc.friction, roughvisc.Case
 
     Examples
     --------
@@ -123,7 +129,7 @@ class SteadySliding(Experiment):
             raise InputError(key="heating", found=self.heating, expected="rv.Heating(...)")
 
     def __repr__(self) -> str:
-        ends = dict.fromkeys(format_quantity(one, "m/s") for one in (min(self.speeds), max(self.speeds)))
+        ends = dict.fromkeys(format_quantity(speed, "m/s") for speed in (min(self.speeds), max(self.speeds)))
         count = f"{len(self.speeds)} speeds from " if len(self.speeds) > 1 else ""
         pressed = format_quantity(self.pressure or 0.0, "Pa") if self.load is None else format_quantity(self.load, "N")
         return f"Steady sliding: {count}{' to '.join(ends)} along {self.direction}, under {pressed}"
@@ -148,8 +154,8 @@ class SteadySliding(Experiment):
         if "displacement" in settings.fields:
             yield "fields", "displacement", "some of pressure, gap in steady sliding"
         for name in OVER_TIME:
-            if (found := getattr(settings, name)) != (usual := getattr(Settings, name)):
-                yield name, found, f"the default in steady sliding, {usual!r}"
+            if (value := getattr(settings, name)) != (usual := getattr(Settings, name)):
+                yield name, value, f"the default in steady sliding, {usual!r}"
 
     def facts(self, body: Body, height: xr.DataArray) -> dict[str, Any]:
         """Return facts about the body after the time in which the surface slides past a point, at the lowest speed."""
@@ -228,19 +234,26 @@ class SlidingRows(Rows):
     """
 
     def __init__(self, problem: Problem, curve: SteadySliding, found: int = 0) -> None:
-        self._body, self._curve, self._settings, self._done = problem.body, curve, problem.settings, found
+        self._body = problem.body
+        self._curve = curve
+        self._settings = problem.settings
+        self._done = found
         profile = Profile(problem.height, "refuse")
-        shape, settings = (profile.gap.shape[0], profile.gap.shape[1]), problem.settings
+        shape = (profile.gap.shape[0], profile.gap.shape[1])
+        settings = problem.settings
         require_memory(shape, partial(curve_bytes, settings), device=settings.device)
         if not profile.all_present:  # a punch has absent cells by its recipe
             raise InputError("height is missing at some points: expected none, because the surface repeats")
-        self.problem, self.end, self.profile = replace(problem, height=profile.height), len(curve.speeds), profile
+        self.problem = replace(problem, height=profile.height)
+        self.end = len(curve.speeds)
+        self.profile = profile
         self._force = float(curve.load) if curve.load is not None else float(curve.pressure or 0.0) * profile.area
         #: The grid of the surface, and up to two coarser grids for the error of the grid.
         self._grids = [SlidingGrid.of(profile.gap, profile.spacing, curve.direction)]
         self._period = self._grids[0].gap.shape[0] * self._grids[0].spacing[0]
         if problem.settings.grid_error:
-            (nx, ny), (dx, dy) = self._grids[0].gap.shape, self._grids[0].spacing
+            nx, ny = self._grids[0].gap.shape
+            dx, dy = self._grids[0].spacing
             for factor in (2.0, 4.0):  # on longer cells, with the waves that these can resolve
                 few = coarser_shape((nx, ny), factor, False)
                 if few != self._grids[-1].gap.shape:
@@ -254,24 +267,28 @@ class SlidingRows(Rows):
         """Slide at each speed."""
         for done, speed in enumerate(self._curve.speeds[self._done :], self._done + 1):
             warm = self._warmed(speed)
-            states, runs = [], []
+            states = []
+            runs = []
             for cells in self._grids:
-                found, sliding = warm.state, warm.sliding
+                state = warm.state
+                sliding = warm.sliding
                 if cells is not self._grids[0]:
-                    found, sliding = self._steady(cells, warm.law, speed, warm.seen)
-                pressure, contact = to_host(found.pressure), to_host(found.pressure) > 0
-                gap = np.where(contact, 0.0, np.maximum(cells.gap + to_host(found.displacement) - found.approach, 0.0))
+                    state, sliding = self._steady(cells, warm.law, speed, warm.seen)
+                pressure = to_host(state.pressure)
+                contact = to_host(state.pressure) > 0
+                gap = np.where(contact, 0.0, np.maximum(cells.gap + to_host(state.displacement) - state.approach, 0.0))
                 counted, area, _ = contact_area(contact, ~contact, math.prod(cells.spacing), "periodic")
-                states.append((found, sliding, pressure, gap, counted, area))
-                runs.append((found.power_force, area, found.approach, float(gap.mean())))
+                states.append((state, sliding, pressure, gap, counted, area))
+                runs.append((state.power_force, area, state.approach, float(gap.mean())))
             row, fields = self._row(*states[0])  # on the grid of the surface
-            pressure, creep = states[0][2], 0.0
+            pressure = states[0][2]
+            creep = 0.0
             if self._settings.grid_error:
                 row |= sliding_grid_errors(self._grids, pressure, runs)
             if stands_alone(self.profile.height, pressure, 0):
-                for one in warm.law.materials:  # without an end of the creep nothing counts as recovered
-                    crept = float(one.contact_compliance(self._period / warm.seen))
-                    creep = max(creep, 1.0 - crept / float(one.contact_compliance(math.inf)))
+                for material in warm.law.materials:  # without an end of the creep nothing counts as recovered
+                    crept = float(material.contact_compliance(self._period / warm.seen))
+                    creep = max(creep, 1.0 - crept / float(material.contact_compliance(math.inf)))
             row["creep_left"] = creep  # left when the next contact arrives
             if self._curve.heating is not None:
                 row["temperature"] = self._curve.heating.temperature + warm.rise
@@ -291,7 +308,8 @@ class SlidingRows(Rows):
 
     def _at(self, speed: float, rise: float) -> Warm:
         """Return the steady state at a speed [m/s] on the grid of the surface, at a rise of temperature. [K]"""
-        heating, grid = self._curve.heating, self._grids[0]
+        heating = self._curve.heating
+        grid = self._grids[0]
         seen = speed if heating is None else speed * float(heating.shift_factor(rise))
         law = grid.law(self._body, seen, 0.1 * self._settings.tolerance)  # a table needs a fit
         return Warm(rise, seen, law, *self._steady(grid, law, speed, seen))
@@ -300,7 +318,7 @@ class SlidingRows(Rows):
         """Return the steady state at a speed [m/s] and at the temperature that the heat of friction makes.
 
         Heat reduces friction exponentially. So the method of false position (Illinois) works on the logarithms of the
-        rises. The number of spots jumps where they merge: the interval may end around a jump.
+        rises. The number of spots jumps when they merge: the interval may end around a jump.
         """
         warm = self._at(speed, 0.0)
         if self._curve.heating is None or (rise := self._rise(warm, speed)) <= _SAME_TEMPERATURE:
@@ -322,14 +340,16 @@ class SlidingRows(Rows):
             if len(ends) == 1:
                 rise *= math.exp(2 * excess if is_cold else excess)
             else:
-                (cold, above), (hot, below) = ends[True], ends[False]
+                cold, above = ends[True]
+                hot, below = ends[False]
                 rise = math.exp((hot * above - cold * below) / (above - below))
         advice = "try other thermal properties, or a lower speed"
         raise ConvergenceError(f"at {format_quantity(speed, 'm/s')}: no temperature of the contact; {advice}")
 
     def _rise(self, warm: Warm, speed: float) -> float:
         """Return the rise of temperature by the heat of friction at a speed [m/s], in the mean spot. [K]"""
-        heating, pressure = self._curve.heating, to_host(warm.state.pressure)
+        heating = self._curve.heating
+        pressure = to_host(warm.state.pressure)
         assert heating is not None
         area = contact_area(pressure > 0, pressure <= 0, math.prod(self._grids[0].spacing), "periodic")[1]
         radius = math.sqrt(area / (math.pi * spot_count(pressure)))
@@ -340,7 +360,9 @@ class SlidingRows(Rows):
         self, found: SteadyState, sliding: Sliding, pressure: Array, gap: Array, counted: float, area: float
     ) -> tuple[dict[str, Any], dict[str, Array]]:
         """Return the variables of a steady state, and its fields in the frame of the surface."""
-        force, nominal, quarters = self._force, self.profile.area, _QUARTERS[self._curve.direction]
+        force = self._force
+        nominal = self.profile.area
+        quarters = _QUARTERS[self._curve.direction]
         status = "full_contact" if (pressure > 0).all() else "converged"
         across = (found.pressure * sliding.slope(found.pressure, axis=1)).sum()
         stated_error = max(found.residual, found.friction_residual)
@@ -372,7 +394,8 @@ class SlidingRows(Rows):
 
     def finish(self, dataset: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
         """Return the result with the direction, and its warnings."""
-        height, speeds = self.problem.height, dataset["speed"].values.tolist()
+        height = self.problem.height
+        speeds = dataset["speed"].values.tolist()
         left = dict(zip(speeds, dataset["creep_left"].values.tolist(), strict=True))
         warnings = {
             "slope": slope_warning(height, "periodic", loaded_depth(height, float(dataset["contact_fraction"].max()))),
@@ -402,7 +425,8 @@ def sliding_grid_errors(
         Name of a variable -> error. NaN without friction, or without a coarser grid. The error of friction is NaN if no
         contact is three cells wide along the motion, the error of the gap if the gap is zero and may be open.
     """
-    grid, (friction, _, deep, wide) = grids[0], runs[0]
+    grid = grids[0]
+    friction, _, deep, wide = runs[0]
     if len(grids) == 1 or friction <= 0:
         return {VARIABLES[name].grid_error: math.nan for name in (*_COMPARED, "mean_contact_pressure")}
     ratio = max(many / few for many, few in zip(grid.gap.shape, grids[1].gap.shape, strict=True))

@@ -5,7 +5,6 @@ A scene holds surface, contact and bodies of a result. Each check returns the si
 
 from __future__ import annotations
 
-import inspect
 import json
 import math
 import textwrap
@@ -29,6 +28,7 @@ from roughvisc.observables.history import expect_result, history
 from roughvisc.runs.netcdf import open_result
 from roughvisc.runs.run import result_folder
 from roughvisc.runs.sweep import run_one
+from roughvisc.solve import Progress
 from roughvisc.study.case import Case, case_given
 from roughvisc.study.properties import properties
 from roughvisc.topography.borders import border_mismatch
@@ -71,7 +71,7 @@ class NotKnown(Exception):
 
 
 @dataclass(frozen=True)
-class Scene:
+class AuditedContact:
     """Surface, contact and bodies of a result. A property that the result does not record raises :class:`NotKnown`.
 
     Attributes
@@ -258,7 +258,7 @@ class Limit:
         Meaning of both limits, and their source.
     """
 
-    check: Callable[[Scene], Found]
+    check: Callable[[AuditedContact], Found]
     doubtful: float
     broken: float
     source: str
@@ -269,7 +269,7 @@ class Limit:
         return (self.check.__doc__ or "").partition(".\n")[0].rstrip(".")
 
 
-def adhesion(scene: Scene) -> Found:
+def adhesion(scene: AuditedContact) -> Found:
     r"""Pull-off force of the spots over the largest load.
 
     Each spot of radius ``R`` holds :math:`\frac32 \pi w R` (JKR). A stiff and small one holds up to a third more (DMT).
@@ -289,7 +289,7 @@ def adhesion(scene: Scene) -> Found:
     return pull / force, f"{held} pulled off."
 
 
-def yielding(scene: Scene) -> Found:
+def yielding(scene: AuditedContact) -> Found:
     """Largest pressure over the yield strength in tension."""
     peak = float(scene.pressure.max())
     for frame in scene.dataset["pressure"]:  # one frame in memory at a time
@@ -298,7 +298,7 @@ def yielding(scene: Scene) -> Found:
     return peak / strength, f"The largest pressure is {as_text(peak, 'Pa')}."
 
 
-def thickness(scene: Scene) -> Found:
+def thickness(scene: AuditedContact) -> Found:
     """Relative error of the approach of a half-space, at the same load."""
     if scene.facts.get("thickness", math.inf) < math.inf:
         return 0.0, f"Modelled: a sheet of {as_text(scene.facts['thickness'], 'm', 3)}, {scene.facts['base']}."
@@ -315,13 +315,13 @@ def thickness(scene: Scene) -> Found:
     return excess, f"{base} the approach would be {percent(excess)} smaller at the same load."
 
 
-def slope(scene: Scene) -> Found:
+def slope(scene: AuditedContact) -> Found:
     """Rms slope of the loaded surface."""
     more = percent(scene.loaded_slope**2 / 2)
     return scene.loaded_slope, f"The loaded surface has {more} more area than its projection."
 
 
-def inertia(scene: Scene) -> Found:
+def inertia(scene: AuditedContact) -> Found:
     r"""Lag of waves over the time scale of the program, or relative increase of the displacement in a slide.
 
     The lag is dashpot over spring of a round punch of radius ``a`` on a half-space, :math:`0.85\,a / c`, with the speed
@@ -341,7 +341,7 @@ def inertia(scene: Scene) -> Found:
     return lag / scale, f"Waves lag by {as_text(lag, 's')} over {as_text(2 * width, 'm')}; {program}."
 
 
-def heating(scene: Scene) -> Found:
+def heating(scene: AuditedContact) -> Found:
     r"""Mean temperature rise of the spots in a slide [K] if all heat flows into the body.
 
     The rise of a slow round spot of radius ``a`` under a heat flux ``q`` is :math:`0.849\,q a / k`, and of a fast one
@@ -362,7 +362,7 @@ def heating(scene: Scene) -> Found:
     return rise, f"{heats} by {as_text(rise, 'K')} above the surface around."
 
 
-def resolution(scene: Scene) -> Found:
+def resolution(scene: AuditedContact) -> Found:
     """Part of the rms slope from the last octave of wavelengths, about the part of the area that it removes."""
     last, longest = scene.waves
     complete = is_analytic(scene.period)
@@ -384,7 +384,7 @@ def resolution(scene: Scene) -> Found:
     return last, f"{adds} area; the next octave may do so again."
 
 
-def border(scene: Scene) -> Found:
+def border(scene: AuditedContact) -> Found:
     """Difference between opposite borders over that between neighbouring rows."""
     if scene.boundary == "free":
         return None
@@ -395,7 +395,7 @@ def border(scene: Scene) -> Found:
     return number, f"Opposite borders differ {number:.2g} times as much as neighbouring rows.{advice}"
 
 
-def _periodic_relief(scene: Scene, sheet: Sheet) -> float:
+def _periodic_relief(scene: AuditedContact, sheet: Sheet) -> float:
     """Return the reduction of the approach by the base of a sheet under a periodic load, over the compliance. [m Pa]
 
     It is the mean of :math:`(K - K_h) * p` with the kernels of half-space and sheet, weighted by the pressure ``p``,
@@ -522,7 +522,7 @@ def audit(
     heat_conductivity: Quantity | None = None,
     volumetric_heat_capacity: Quantity | None = None,
     out: str | Path | None = None,
-    progress: bool = True,
+    progress: bool | Progress = True,
     threads: int | None = None,
 ) -> xr.Dataset:
     """Check the assumptions of the model for a result.
@@ -581,12 +581,19 @@ def audit(
     >>> found.verdict.sel(assumption=["adhesion", "slope", "yielding"]).values.tolist()
     ['broken', 'holds', 'not known']
     """
-    given = dict(locals())
-    named = {name: given[name] for name in inspect.signature(properties).parameters}
+    stated = {
+        "work_of_adhesion": work_of_adhesion,
+        "yield_strength": yield_strength,
+        "thickness": thickness,
+        "base": base,
+        "density": density,
+        "heat_conductivity": heat_conductivity,
+        "volumetric_heat_capacity": volumetric_heat_capacity,
+    }
     if not isinstance(result, xr.Dataset):
         case = case_given(result, "result")
         result = open_result(run_one(case, result_folder(case, out), progress=progress, threads=threads))
-    found = audit_of(result, **named)
+    found = audit_of(result, **stated)
     columns = {
         "verdict": ("verdict", [one.verdict for one in found]),
         "number": ("number that is compared with the limits", [one.number for one in found]),
@@ -608,7 +615,7 @@ def audit_of(result: xr.Dataset, **given: Any) -> Audit:
         source = result.encoding.get("source")
         case = Case.from_json(result.attrs["case"], Path(source).parent if source else None)
         given = {**case.audit_inputs, **given}
-    scene, findings = Scene(result, given, case), []
+    scene, findings = AuditedContact(result, given, case), []
     for name, limit in LIMITS.items():
         try:
             found = limit.check(scene)

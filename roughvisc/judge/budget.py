@@ -597,6 +597,17 @@ def budget(
     See Also
     --------
     roughvisc.audit : the assumptions of the model.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=15), rv.Program().load(1e-5, over="1 s")
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     sources = rv.budget(case, "approach", modulus_error="5 %", out=folder, workers=0, progress=False).load()
+    >>> "modulus" in sources.source.values
+    True
     """
     known = {
         "modulus_error": modulus_error,

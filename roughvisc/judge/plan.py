@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from scipy import fft
 from scipy.special import erf, erfinv
 
+from roughvisc.arguments import count
 from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.experiment.base import Rows
 from roughvisc.experiment.loading import Loading, LoadingRows
@@ -94,7 +95,7 @@ def plan(
     out : path, optional
         Results folder, to check the disk space. Default: as in :func:`roughvisc.sweep`.
     workers : int, optional
-        Number of parallel processes. Default: one per core, or fewer if the memory is too small.
+        Number of parallel processes; 0: this process. Default: one per core, or fewer if the memory is too small.
 
     Returns
     -------
@@ -117,6 +118,10 @@ def plan(
     InputError
         If the study file is invalid.
 
+    See Also
+    --------
+    roughvisc.run, roughvisc.sweep, roughvisc.trade
+
     Notes
     -----
     A case runs on at most 128 cells a side, with its own tolerance and kept times; a friction curve on 48, at some of
@@ -124,8 +129,17 @@ def plan(
     run; Persson's theory corrects it for the slopes that the coarse grid does not resolve. The time follows from a few
     iterations on the real grid. The time is accurate to a factor of 2, memory to 1.3, disk and contact fraction to 1.2.
     In a sweep with many cases some have no coarse run, and the coarse run of the nearest case in the list is used.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=15), rv.Program().load(1e-5, over="1 s")
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
+    >>> rv.plan(case).sizes["case"]
+    1
     """
     cases = cases_given(cases)
+    count("workers", workers, 0)
     folder, there = result_folder(cases[0], out), memory_available(cases[0].settings.device)
     stated = [json.loads(case.to_json()) for case in cases]
     parameters = parameters_of(stated)
@@ -472,7 +486,7 @@ def totals(dataset: xr.Dataset, folder: Path, workers: int | None, there: Availa
     free_disk, total = shutil.disk_usage(place).free, dataset.sizes["case"]
     seconds = np.nan_to_num(dataset["wall_time"].values)
     largest = np.sort(np.nan_to_num(dataset["memory"].values))[::-1]
-    processes = workers or processes_that_fit(largest[0], threads_each(1), there.size)
+    processes = processes_that_fit(largest[0], threads_each(1), there.size) if workers is None else max(workers, 1)
     processes = min(processes, total)
     together, size = float(np.sum(largest[:processes])), float(np.nansum(dataset["disk"].values))
     refusals = [str(text) for text in dataset["refusal"].values if text]
@@ -488,9 +502,9 @@ def totals(dataset: xr.Dataset, folder: Path, workers: int | None, there: Availa
         "processes": processes,
         "threads": threads_each(processes),
         "wall_time": max(float(np.sum(seconds)) / processes, float(np.max(seconds))),
-        "memory": together,
+        "memory": round(together),
         "free_memory": there.size,
-        "disk": size,
+        "disk": round(size),
         "free_disk": free_disk,
         "refusal": "; ".join(reasons),
     }

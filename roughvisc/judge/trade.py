@@ -94,6 +94,10 @@ def trade(
     RoughviscError
         If a solve fails.
 
+    See Also
+    --------
+    roughvisc.plan, roughvisc.budget, roughvisc.plot.trade
+
     Notes
     -----
     Settings are solved in this process one after the other. Together they take about five times as long as the case of
@@ -103,6 +107,17 @@ def trade(
     coarser, by Richardson extrapolation with Roache's safety factors. Pressures on two grids are compared as means over
     the coarser cells. In a slide the profile moves by whole cells. Times in a slide are kept if the profile has moved
     by whole cells of every grid, which includes the beginning and the end.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=15), rv.Program().load(1e-5, over="1 s")
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     measured = rv.trade(case, [(1e-1, 1.0)], out=folder, progress=False).load()
+    >>> measured.tolerance.values.tolist()
+    [0.1]
     """
     case = case_given(case)
     requested = listed_names(quantity)

@@ -57,6 +57,10 @@ def adhesion(
     InputError
         If a quantity is not valid, or not exactly one of `range` and `strength` is given.
 
+    See Also
+    --------
+    roughvisc.simulate, roughvisc.observables.pull_off
+
     Notes
     -----
     Surfaces at the gap :math:`g` attract each other with the tension

@@ -274,6 +274,10 @@ class Body:
     InputError
         If either has a wrong type.
 
+    See Also
+    --------
+    roughvisc.sheet, roughvisc.layer
+
     Examples
     --------
     >>> import roughvisc as rv

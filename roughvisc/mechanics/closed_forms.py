@@ -77,6 +77,10 @@ def hertz(sphere_radius: Quantity, contact_modulus: Quantity, force: Quantity) -
     InputError
         If a parameter is not positive and finite.
 
+    See Also
+    --------
+    roughvisc.sphere, roughvisc.closed_forms.lee_radok
+
     Notes
     -----
     .. math:: a^3 = \frac{3 W R}{4 E^*}, \quad \delta = \frac{a^2}{R}, \quad
@@ -124,6 +128,10 @@ def cone(slope: float, contact_modulus: Quantity, force: Quantity) -> RoundConta
     InputError
         If a parameter is not positive and finite.
 
+    See Also
+    --------
+    roughvisc.cone, roughvisc.closed_forms.hertz
+
     Notes
     -----
     .. math:: W = \frac{\pi}{2} E^* m a^2, \quad \delta = \frac{\pi}{2} m a, \quad
@@ -132,6 +140,13 @@ def cone(slope: float, contact_modulus: Quantity, force: Quantity) -> RoundConta
     References
     ----------
     .. [1] K. L. Johnson, *Contact Mechanics*, Cambridge University Press, 1985, section 5.2.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> contact = rv.closed_forms.cone(slope=0.1, contact_modulus="4 MPa", force="0.2 N")
+    >>> round(contact.approach / contact.radius, 4)  # pi m / 2
+    0.1571
     """
     a = float(np.sqrt(2 * force / (np.pi * contact_modulus * slope)))
 
@@ -168,6 +183,10 @@ def flat_punch(radius: Quantity, contact_modulus: Quantity, force: Quantity) -> 
     InputError
         If a parameter is not positive and finite.
 
+    See Also
+    --------
+    roughvisc.flat_punch, roughvisc.closed_forms.hertz
+
     Notes
     -----
     .. math:: \delta = \frac{W}{2 E^* a}, \quad p = \frac{W}{2 \pi a \sqrt{a^2 - r^2}}
@@ -175,6 +194,12 @@ def flat_punch(radius: Quantity, contact_modulus: Quantity, force: Quantity) -> 
     References
     ----------
     .. [1] K. L. Johnson, *Contact Mechanics*, Cambridge University Press, 1985, section 3.4.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rv.closed_forms.flat_punch(radius="1 mm", contact_modulus="4 MPa", force="8 N").approach
+    0.001
     """
     a = radius
     approach = force / (2 * contact_modulus * radius)
@@ -237,6 +262,10 @@ def westergaard(
     InputError
         If a parameter is not positive and finite.
 
+    See Also
+    --------
+    roughvisc.wavy, roughvisc.closed_forms.johnson_greenwood_higginson
+
     Notes
     -----
     .. math:: p^* = \frac{\pi E^* a}{l}, \quad \sin^2 \frac{\pi b}{l} = \frac{\bar p}{p^*}, \quad
@@ -282,6 +311,10 @@ def johnson_greenwood_higginson(mean_over_full: ArrayLike, limit: str) -> Array:
     ndarray
         Contact area over nominal area. [-]
 
+    See Also
+    --------
+    roughvisc.wavy, roughvisc.closed_forms.westergaard
+
     Notes
     -----
     With two crests and two troughs in each square of side ``l``, a crest of radius ``l^2 / (4 pi^2 a)`` and a
@@ -294,6 +327,12 @@ def johnson_greenwood_higginson(mean_over_full: ArrayLike, limit: str) -> Array:
     ----------
     .. [1] K. L. Johnson, J. A. Greenwood, J. G. Higginson, "The contact of elastic regular wavy surfaces",
        *Int. J. Mech. Sci.* 27 (1985) 383-396.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> float(rv.closed_forms.johnson_greenwood_higginson(1.0, "high"))  # the pressure of full contact
+    1.0
     """
     ratio = np.asarray(mean_over_full, dtype=float)
     if one_of("limit", limit, ("low", "high")) == "low":
@@ -366,6 +405,10 @@ def lee_radok(sphere_radius: Quantity, material: Material, load: Quantity | Prog
     ------
     InputError
         If a parameter is not positive and finite; if the load falls further, or the program prescribes something else.
+
+    See Also
+    --------
+    roughvisc.closed_forms.hertz
 
     Notes
     -----

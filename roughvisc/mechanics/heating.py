@@ -82,6 +82,10 @@ class Heating:
     InputError
         If a value is not positive and finite, or `shift` is not a function.
 
+    See Also
+    --------
+    roughvisc.friction, roughvisc.friction_theory, roughvisc.wlf
+
     Notes
     -----
     All heat flows into this body. The counterface takes a part in a real contact, and the temperature is then lower.

@@ -506,6 +506,10 @@ def layer(material: Material, thickness: Quantity, *, on: Any) -> Body:
         If the thickness is not positive; if a material describes two bodies, or its Poisson's ratio is negative or
         changes in time; if the layer lies on a sheet or a body of your own.
 
+    See Also
+    --------
+    roughvisc.sheet, roughvisc.Body
+
     Notes
     -----
     The response depends on the wavelength of the pressure, see

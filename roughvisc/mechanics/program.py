@@ -179,6 +179,15 @@ class Program:
     note : str
         Origin of the program, for example the conversion of a measured history.
 
+    Raises
+    ------
+    InputError
+        If a segment is invalid; the key of the error is the method.
+
+    See Also
+    --------
+    roughvisc.read_program, roughvisc.simulate, roughvisc.SteadySliding
+
     Examples
     --------
     >>> program = Program().load(2.0, over=0.05).hold(5.0).load(0.0, over="50 ms")

@@ -61,6 +61,10 @@ def sheet(material: Material, thickness: Quantity, base: Base = BASE) -> Body:
         If the thickness is not positive or the base is unknown; if the material describes two bodies, or its Poisson
         ratio is negative or changes in time: space and time do not separate then.
 
+    See Also
+    --------
+    roughvisc.layer, roughvisc.Body
+
     Examples
     --------
     >>> import roughvisc as rv

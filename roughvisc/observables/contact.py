@@ -42,6 +42,19 @@ def contact(dataset: xr.Dataset) -> xr.DataArray:
     ------
     InputError
         If the result contains neither ``pressure`` nor ``gap``.
+
+    See Also
+    --------
+    roughvisc.observables.clusters
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> ball = rv.sphere(radius=1e-3, size=2e-4, shape=33)
+    >>> press = rv.Program().load(1e-4, over=0)
+    >>> ds = rv.simulate(ball, rv.elastic(1e6), press, times=[0.0], progress=False)
+    >>> int(rv.observables.contact(ds).sum()) == int((ds.pressure > 0).sum())
+    True
     """
     name = "pressure" if "pressure" in dataset and "adhesive_force" not in dataset else "gap"
     need(dataset, name)
@@ -68,6 +81,19 @@ def clusters(dataset: xr.Dataset) -> xr.Dataset:
     ------
     InputError
         If the result contains neither ``pressure`` nor ``gap``, or the cells of its grid are not equal.
+
+    See Also
+    --------
+    roughvisc.observables.contact
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> ball = rv.sphere(radius=1e-3, size=2e-4, shape=33)
+    >>> press = rv.Program().load(1e-4, over=0)
+    >>> ds = rv.simulate(ball, rv.elastic(1e6), press, times=[0.0], progress=False)
+    >>> rv.observables.clusters(ds).cluster_count.item()
+    1
     """
     periodic = boundary_of(dataset) == "periodic"
 
@@ -77,12 +103,12 @@ def clusters(dataset: xr.Dataset) -> xr.Dataset:
 
     cell = math.prod(spacing(dataset, "clusters"))
     count, mean, largest = frame_by_frame(measure, contact(dataset), outputs=[(), (), ()])
-    found = {
+    columns = {
         "cluster_count": count.astype("int64"),
         "cluster_area_mean": mean * cell,
         "cluster_area_largest": largest * cell,
     }
-    return label(xr.Dataset(found))
+    return label(xr.Dataset(columns))
 
 
 def distribution(
@@ -110,10 +136,25 @@ def distribution(
     ------
     InputError
         If the result does not contain the field, or edges do not increase.
+
+    See Also
+    --------
+    roughvisc.observables.contact
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> ball = rv.sphere(radius=1e-3, size=2e-4, shape=33)
+    >>> press = rv.Program().load(1e-4, over=0)
+    >>> ds = rv.simulate(ball, rv.elastic(1e6), press, times=[0.0], progress=False)
+    >>> density = rv.observables.distribution(ds, bins=10).pressure_density
+    >>> density.dims
+    ('time', 'pressure_bin')
     """
     one_of("name", name, ("pressure", "gap"))
     need(dataset, name)
-    field, dim = by_frame(dataset[name]), f"{name}_bin"
+    field = by_frame(dataset[name])
+    dim = f"{name}_bin"
     if isinstance(bins, int | np.integer):
         largest = float(field.max())
         edges = np.linspace(0.0, largest if largest > 0 else 1.0, int(bins) + 1)
@@ -172,6 +213,10 @@ def leakage(
         If the result contains no ``gap``, or the surface is absent in some cells, where the gap is unknown; if a
         quantity has a wrong unit, or a word is unknown.
 
+    See Also
+    --------
+    roughvisc.observables.closure, roughvisc.plot.maps
+
     Notes
     -----
     Reynolds' equation, :math:`\nabla \cdot (g^3 / 12 \eta \, \nabla P) = 0`; cells in contact are closed, and cells
@@ -189,12 +234,19 @@ def leakage(
 
     Examples
     --------
-    >>> rv.observables.leakage(ds, viscosity="1 mPa s", pressure_drop="2 bar").leak_rate  # doctest: +SKIP
+    >>> import roughvisc as rv
+    >>> wave = rv.wavy("1 um", "0.1 mm", "0.1 mm", 16)
+    >>> press = rv.Program().pressure("20 kPa", over="1 s")
+    >>> ds = rv.simulate(wave, rv.elastic(1e6), press, times=3, progress=False)
+    >>> leak = rv.observables.leakage(ds, viscosity="1 mPa s", pressure_drop="2 bar").leak_rate
+    >>> bool(leak[-1] < leak[0])  # the gap has closed
+    True
     """
     one_of("along", along, ("x", "y"))
     need(dataset, "gap")
     wrap = boundary_of(dataset) == "periodic"
-    gap, cells = dataset["gap"], dict(zip("xy", spacing(dataset, "leakage"), strict=True))
+    gap = dataset["gap"]
+    cells = dict(zip("xy", spacing(dataset, "leakage"), strict=True))
     across = "y" if along == "x" else "x"
     sides_of_cell = cells[along], cells[across]
 
@@ -217,8 +269,8 @@ def leakage(
         "transmissivity": transmissivity,
         "hydraulic_aperture": (12 * transmissivity) ** (1 / 3),
     }
-    for axis, one in zip((along, across), fields, strict=False):
-        variables[f"flux_{axis}"] = (one * drop).transpose(*gap.dims)
+    for axis, flux in zip((along, across), fields, strict=False):
+        variables[f"flux_{axis}"] = (flux * drop).transpose(*gap.dims)
     described = label(xr.Dataset(variables))
     described["leak_rate"].attrs |= {"along": along, "viscosity": viscosity, "pressure_drop": pressure_drop}
     return described
@@ -246,6 +298,10 @@ def closure(dataset: xr.Dataset, *, along: Literal["x", "y"] = "x") -> xr.Datase
     InputError
         See :func:`leakage`.
 
+    See Also
+    --------
+    roughvisc.observables.leakage, roughvisc.combine
+
     Notes
     -----
     The closure is the fall of the mean gap since first touch of the undeformed faces. The stiffness is
@@ -255,23 +311,30 @@ def closure(dataset: xr.Dataset, *, along: Literal["x", "y"] = "x") -> xr.Datase
 
     Examples
     --------
-    >>> rv.observables.closure(ds).to_dataframe().to_csv("joint.csv")  # doctest: +SKIP
+    >>> import roughvisc as rv
+    >>> wave = rv.wavy("1 um", "0.1 mm", "0.1 mm", 16)
+    >>> press = rv.Program().pressure("20 kPa", over="1 s")
+    >>> ds = rv.simulate(wave, rv.elastic(1e6), press, times=3, progress=False)
+    >>> joint = rv.observables.closure(ds)
+    >>> bool(joint.closure[-1] > joint.closure[0])
+    True
     """
     need(dataset, "gap", "height", "mean_gap", "force")
     aperture = leakage(dataset, along=along)["hydraulic_aperture"]
-    height, mean_gap = dataset["height"], dataset["mean_gap"]
+    height = dataset["height"]
+    mean_gap = dataset["mean_gap"]
     highest = height.attrs.get("highest", height.max(("x", "y")))
     closed = (highest - height.mean(("x", "y"))) - mean_gap
     pressure = dataset["force"] / (math.prod(spacing(dataset, "closure")) * height.sizes["x"] * height.sizes["y"])
 
     def stiffness(pressure: np.ndarray, closed: np.ndarray) -> np.ndarray:
-        found = np.full(pressure.shape, np.nan)
+        values = np.full(pressure.shape, np.nan)
         rows = np.flatnonzero(pressure > 0)
         if rows.size > 1:
             with np.errstate(divide="ignore", invalid="ignore"):
                 slope = np.gradient(closed[rows], np.log(pressure[rows]))
-                found[rows] = pressure[rows] / slope
-        return np.where(np.isfinite(found), found, np.nan)
+                values[rows] = pressure[rows] / slope
+        return np.where(np.isfinite(values), values, np.nan)
 
     axis = [str(dim) for dim in mean_gap.dims][-1:]
     stiff = xr.apply_ufunc(
@@ -311,6 +374,10 @@ def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str]) -> xr.D
         If the result contains neither ``pressure`` nor ``gap``. If there are not two resistivities of one kind, one is
         negative, or both are zero.
 
+    See Also
+    --------
+    roughvisc.observables.contact
+
     Notes
     -----
     All spots have one potential, and each body is at a constant potential far from the spots. The conductance is
@@ -323,13 +390,24 @@ def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str]) -> xr.D
     References
     ----------
     .. [1] J. R. Barber, *Proc. R. Soc. A* 459 (2003) 53-66.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> ball = rv.sphere(radius=1e-3, size=1e-4, shape=65)
+    >>> press = rv.Program().load(1e-4, over=0)
+    >>> ds = rv.simulate(ball, rv.elastic(1e6), press, times=[0.0], progress=False)
+    >>> spot = rv.observables.conductance(ds, resistivity=["0.2 K m/W", 0.0]).thermal_conductance
+    >>> radius = rv.closed_forms.hertz(1e-3, 4e6, 1e-4).radius
+    >>> bool(abs(spot / (4 * radius / 0.2) - 1) < 0.03)
+    True
     """
     if isinstance(resistivity, str) or not isinstance(resistivity, Sequence) or len(resistivity) != 2:
         wanted = 'a list of two, one of each body, in K m/W or, as strings such as "2e-8 ohm m", in ohm m'
         raise InputError(key="resistivity", found=resistivity, expected=wanted)
-    texts = [one for one in resistivity if isinstance(one, str) and not is_quantity(one, "1")]
-    kind = "electrical" if any(is_quantity(one, _UNITS["electrical"]) for one in texts) else "thermal"
-    both = [number(one, _UNITS[kind], "resistivity") for one in resistivity]
+    texts = [value for value in resistivity if isinstance(value, str) and not is_quantity(value, "1")]
+    kind = "electrical" if any(is_quantity(value, _UNITS["electrical"]) for value in texts) else "thermal"
+    both = [number(value, _UNITS[kind], "resistivity") for value in resistivity]
     if min(both) < 0 or sum(both) == 0:
         raise InputError(key="resistivity", found=resistivity, expected="none below zero, and not both zero")
     touching = contact(dataset)
@@ -341,7 +419,8 @@ def conductance(dataset: xr.Dataset, resistivity: Sequence[float | str]) -> xr.D
         return frozen_contact(touching, cells, boundary, present=present)
 
     stiffness, error = frame_by_frame(measure, touching, present, outputs=[(), ()])
-    name, factor = f"{kind}_conductance", 2 / sum(both)
+    name = f"{kind}_conductance"
+    factor = 2 / sum(both)
     described = label(xr.Dataset({name: factor * stiffness, f"{name}_error": factor * error}))
     described[name].attrs["resistivity"] = both
     return described

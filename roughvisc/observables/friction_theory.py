@@ -76,6 +76,10 @@ def friction_theory(
     ConvergenceError
         If the temperatures at a speed are not found.
 
+    See Also
+    --------
+    roughvisc.friction, roughvisc.psd_table, roughvisc.Heating, roughvisc.observables.persson
+
     Notes
     -----
     With the density :math:`C(q)` of :func:`roughvisc.psd` and means over the directions of the waves,
@@ -166,12 +170,13 @@ def _speeds(speeds: Any) -> list[float]:
     values = listed(speeds, "m/s", "speeds").tolist()
     if not values:
         raise InputError(key="speeds", found=speeds, expected="at least one speed [m/s]")
-    return [number(one, "m/s", "speeds", above=0) for one in values]
+    return [number(speed, "m/s", "speeds", above=0) for speed in values]
 
 
 def _decades(q: Array) -> Array:
     """Return the wave numbers at the borders of the decades of wavelength, powers of ten, and at both ends. [rad/m]"""
-    low, high = math.log10(q[0] / (2 * math.pi)), math.log10(q[-1] / (2 * math.pi))
+    low = math.log10(q[0] / (2 * math.pi))
+    high = math.log10(q[-1] / (2 * math.pi))
     inner = np.arange(math.floor(low) + 1, math.ceil(high))
     inner = inner[(inner > low + _REST) & (inner < high - _REST)]
     return np.concatenate([q[:1], 2 * math.pi * 10.0**inner, q[-1:]])

@@ -45,9 +45,9 @@ def expect_result(dataset: Any, *names: str) -> xr.Dataset:
         raise InputError(f"the result has no {axis}: expected at least one row")
     for name in names:
         if name in VARIABLES and set(dataset[name].dims) - {*VARIABLES[name].over(axis)}:  # by xarray's where, for one
-            found = dataset[name].dims
+            dims = dataset[name].dims
             expected = f"dimensions {', '.join(VARIABLES[name].over(axis))}, as stored"
-            raise InputError(key=name, found=found, expected=expected)
+            raise InputError(key=name, found=dims, expected=expected)
     return dataset
 
 
@@ -72,7 +72,7 @@ def frame_by_frame(
     Parameters
     ----------
     function : callable
-        Returns a number or an array, or a tuple of them for several `outputs`.
+        Returns a number or an array, or a tuple for several `outputs`.
     *fields : xarray.DataArray
         Over x and y and any other dimensions.
     outputs : sequence of sequence of str
@@ -112,6 +112,20 @@ def history(dataset: xr.Dataset) -> xr.Dataset:
     ------
     InputError
         If the Dataset contains several cases, or has lost the history of its steps.
+
+    See Also
+    --------
+    roughvisc.plot.history, roughvisc.observables.cycle_work
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> wave = rv.wavy("1 um", "0.1 mm", "0.1 mm", 16)
+    >>> press = rv.Program().pressure("20 kPa", over="1 s")
+    >>> ds = rv.simulate(wave, rv.elastic(1e6), press, times=3, progress=False)
+    >>> steps = rv.observables.history(ds)
+    >>> steps.sizes["time"] >= ds.sizes["time"]
+    True
     """
     expect_declared_units(dataset)
     if "case" in dataset.dims:
@@ -141,10 +155,23 @@ def cycle_work(dataset: xr.Dataset) -> xr.Dataset:
         If the program has no whole cycle, or the Dataset has lost the history of its steps and a cycle begins or ends
         between its rows.
 
+    See Also
+    --------
+    roughvisc.observables.history, roughvisc.Program
+
     Notes
     -----
     The work of a cycle is the change of the variable ``work`` in the cycle, over all accepted steps. Between steps
     ``work`` is interpolated linearly.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rubber = rv.zener(3e6, 1e6, 1e5)
+    >>> waves = rv.Program().cycle(mean="0.1 mN", amplitude="0.05 mN", period="0.2 s", cycles=2)
+    >>> ds = rv.simulate(rv.sphere(1e-3, 2e-4, 17), rubber, waves, tolerance=1e-2, times=3, progress=False)
+    >>> bool((rv.observables.cycle_work(ds).cycle_work > 0).all())
+    True
     """
     dataset = expect_result(dataset, "time", "work")
     segments = json.loads(dataset.attrs.get("cycles", "[]"))

@@ -31,11 +31,25 @@ def pull_off(dataset: xr.Dataset) -> xr.Dataset:
     InputError
         If the Dataset is not the result of one case over time.
 
+    See Also
+    --------
+    roughvisc.adhesion, roughvisc.observables.cycle_work
+
     Notes
     -----
     The work of separation is the work of the tension while the surfaces recede,
     :math:`\int \min(F, 0) \, d\delta` over falling approaches :math:`\delta`. Force and approach are linear within
     steps.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> ball, attraction = rv.sphere("1 mm", "0.2 mm", 24), rv.adhesion(work="50 mJ/m2", range="2 um")
+    >>> press = rv.Program().approach("1 um", over="1 s").approach("-10 um", over="1 s")
+    >>> body, settings = rv.elastic(1e6), {"tolerance": 0.1, "edge": "accept", "progress": False}
+    >>> ds = rv.simulate(ball, body, press, adhesion=attraction, **settings)
+    >>> bool(rv.observables.pull_off(ds).pull_off_force[0] > 0)
+    True
     """
     dataset = expect_result(dataset, "time", "force", "approach")
     known = steps_of(dataset)
@@ -50,12 +64,12 @@ def pull_off(dataset: xr.Dataset) -> xr.Dataset:
     tension = np.minimum(force, 0.0)
     moved = np.minimum(np.diff(approach), 0.0)
     work = 0.5 * (tension[1:] + tension[:-1]) * moved
-    found = np.zeros((3, len(cycles)))
+    columns = np.zeros((3, len(cycles)))
     for number, (begin, end) in enumerate(cycles):
         inside = np.flatnonzero((time >= begin) & (time <= end))
         lowest = inside[np.argmin(tension[inside])]
         pulls = tension[lowest] < 0
-        found[:, number] = -tension[lowest], time[lowest] if pulls else np.nan, work[inside[:-1]].sum()
+        columns[:, number] = -tension[lowest], time[lowest] if pulls else np.nan, work[inside[:-1]].sum()
     names = ("pull_off_force", "pull_off_time", "work_of_separation")
-    variables = {name: ("cycle", values) for name, values in zip(names, found, strict=True)}
+    variables = {name: ("cycle", values) for name, values in zip(names, columns, strict=True)}
     return label(xr.Dataset(variables, {"cycle": np.arange(len(cycles)) + 1}))

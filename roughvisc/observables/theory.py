@@ -69,6 +69,10 @@ def area_by_theory(dataset: xr.Dataset, material: Material) -> xr.Dataset:
         If the boundaries are not periodic, the body is not a half-space, the result contains several cases, or it has
         lost the history of its steps, on which the theory depends.
 
+    See Also
+    --------
+    roughvisc.observables.persson, roughvisc.plot.area_against_load
+
     Notes
     -----
     On an elastic half-space Persson's theory [1]_ gives :math:`A = A_0 \, \mathrm{erf}(\sqrt2 \, p / (E^* h'))` with
@@ -82,6 +86,16 @@ def area_by_theory(dataset: xr.Dataset, material: Material) -> xr.Dataset:
     ----------
     .. [1] B. N. J. Persson, *J. Chem. Phys.* 115 (2001) 3840-3861.
     .. [2] A. W. Bush, R. D. Gibson, T. R. Thomas, *Wear* 35 (1975) 87-111.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rough = rv.self_affine("1 mm", 32, hurst=0.8, rms_slope=0.1, seed=1)
+    >>> press = rv.Program().pressure("20 kPa", over="1 s")
+    >>> ds = rv.simulate(rough, rv.elastic(1e6), press, times=2, progress=False)
+    >>> theory = rv.observables.area_by_theory(ds, rv.elastic(1e6))
+    >>> bool(theory.asperity_contact_area[-1] > theory.persson_contact_area[-1] > 0)
+    True
     """
     dataset = expect_result(dataset, "force", "height")
     if dataset.attrs.get("boundary") not in ("periodic", "mirror"):
@@ -131,9 +145,22 @@ def persson(dataset: xr.Dataset, material: Material | Body) -> xr.Dataset:
     InputError
         If the Dataset is not a friction curve.
 
+    See Also
+    --------
+    roughvisc.friction, roughvisc.friction_theory, roughvisc.observables.area_by_theory
+
     References
     ----------
     .. [1] B. N. J. Persson, *J. Chem. Phys.* 115 (2001) 3840.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rough = rv.self_affine("1 mm", 32, hurst=0.8, rms_slope=0.1, seed=1)
+    >>> rubber = rv.zener(3e6, 1e6, 1e5)
+    >>> ds = rv.friction(rough, rubber, pressure="0.1 MPa", speeds=["10 mm/s"], tolerance=1e-2, progress=False)
+    >>> bool(rv.observables.persson(ds, rubber).persson_friction_coefficient > 0)
+    True
     """
     dataset = expect_result(dataset)
     if not {"height", "nominal_pressure", "speed"} <= set(dataset.variables) or "direction" not in dataset.attrs:
@@ -193,10 +220,13 @@ def friction_of_waves(sliding: Sliding, height: Array, pressure: float) -> tuple
     power = wavevectors(height.shape, (1.0, 1.0))[2] * np.abs(waves) ** 2
     stiffness = np.divide(1.0, sliding.response, where=length > 0, out=np.zeros(waves.shape, complex))
     order = np.argsort(length, axis=None)
-    stress, drag = ((power * part).ravel()[order] for part in (np.abs(stiffness) ** 2, -sliding.qx * stiffness.imag))
+    stress, drag = (
+        (power * factor).ravel()[order] for factor in (np.abs(stiffness) ** 2, -sliding.qx * stiffness.imag)
+    )
     sorted_length = length.ravel()[order]
     first = np.flatnonzero(np.diff(sorted_length, prepend=-1.0) > _SAME * sorted_length)
-    own, drag = np.add.reduceat(stress, first), np.add.reduceat(drag, first)
+    own = np.add.reduceat(stress, first)
+    drag = np.add.reduceat(drag, first)
     variance = np.cumsum(own) - own / 2
     with np.errstate(divide="ignore"):
         contact = erf(pressure / np.sqrt(2 * variance))

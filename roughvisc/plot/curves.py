@@ -56,6 +56,20 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
     ------
     InputError
         If the Dataset is not one case's result, or lacks a quantity.
+
+    See Also
+    --------
+    roughvisc.plot.sweep, roughvisc.observables.history
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> wave = rv.wavy("1 um", "0.1 mm", "0.1 mm", 16)
+    >>> press = rv.Program().pressure("20 kPa", over="1 s")
+    >>> ds = rv.simulate(wave, rv.elastic(1e6), press, times=3, progress=False)
+    >>> figure = rv.plot.history(ds, ["contact_area", "mean_gap"])
+    >>> len(figure.axes)
+    2
     """
     dataset = expect_result(dataset)
     axis = axis_of(dataset.variables)
@@ -138,6 +152,15 @@ def area_against_load(results: xr.Dataset | Mapping[str, xr.Dataset], *, contact
     -------
     matplotlib.figure.Figure
 
+    Raises
+    ------
+    InputError
+        If the results are not those of single cases, or names of moduli are equal to no result.
+
+    See Also
+    --------
+    roughvisc.plot.history, roughvisc.observables.area_by_theory
+
     Notes
     -----
     The line for low loads is :math:`A = \sqrt{2 \pi} F / (E^* h'_\mathrm{rms})` [1]_. The line of Persson's theory
@@ -148,6 +171,16 @@ def area_against_load(results: xr.Dataset | Mapping[str, xr.Dataset], *, contact
     ----------
     .. [1] A. W. Bush, R. D. Gibson, T. R. Thomas, *Wear* 35 (1975) 87-111.
     .. [2] B. N. J. Persson, *J. Chem. Phys.* 115 (2001) 3840-3861.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> wave = rv.wavy("1 um", "0.1 mm", "0.1 mm", 16)
+    >>> press = rv.Program().pressure("20 kPa", over="1 s")
+    >>> ds = rv.simulate(wave, rv.elastic(1e6), press, times=3, progress=False)
+    >>> figure = rv.plot.area_against_load(ds, contact_modulus="4 MPa")
+    >>> len(figure.axes)
+    1
     """
     if isinstance(results, xr.Dataset):
         results = {"computed": results}
@@ -204,6 +237,18 @@ def friction(dataset: xr.Dataset) -> Figure:
     ------
     InputError
         If the Dataset does not hold friction over the speed.
+
+    See Also
+    --------
+    roughvisc.friction, roughvisc.plot.history
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> wave, rubber = rv.wavy("1 um", "1 mm", ("1 mm", "0.1 mm"), (24, 3), waves=1), rv.zener(3e6, 1e6, 1e3)
+    >>> curve = rv.friction(wave, rubber, pressure="50 kPa", speeds=["1 mm/s", "1 m/s"], progress=False)
+    >>> len(rv.plot.friction(curve).axes)
+    2
     """
     names = ("friction_coefficient", "contact_fraction")
     expect_result(dataset, "speed", *names)
@@ -232,6 +277,20 @@ def trade(dataset: xr.Dataset, quantity: str | None = None) -> Figure:
     ------
     InputError
         If the Dataset is not a trade or does not hold the quantity.
+
+    See Also
+    --------
+    roughvisc.trade, roughvisc.plot.budget
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=15), rv.Program().load(1e-5, over="1 s")
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     measured = rv.trade(case, [(1e-1, 1.0)], out=folder, progress=False).load()
+    >>> figure = rv.plot.trade(measured)
     """
     if not isinstance(dataset, xr.Dataset) or "run_time" not in dataset:
         raise InputError("expected the Dataset of rv.trade")
@@ -280,6 +339,20 @@ def budget(dataset: xr.Dataset, row: int = -1) -> Figure:
     ------
     InputError
         If the Dataset is not a budget, or holds several quantities.
+
+    See Also
+    --------
+    roughvisc.budget, roughvisc.plot.trade
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=15), rv.Program().load(1e-5, over="1 s")
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     sources = rv.budget(case, "approach", out=folder, workers=0, progress=False).load()
+    >>> figure = rv.plot.budget(sources)
     """
     if not isinstance(dataset, xr.Dataset) or "half_width" not in dataset or "source" not in dataset.dims:
         raise InputError("expected the Dataset of rv.budget")

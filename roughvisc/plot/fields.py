@@ -330,6 +330,18 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
     ------
     InputError
         If the result holds none of the fields, or more than 8 times are requested.
+
+    See Also
+    --------
+    roughvisc.plot.section, roughvisc.plot.animate
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> wave = rv.wavy("1 um", "0.1 mm", "0.1 mm", 16)
+    >>> press = rv.Program().pressure("20 kPa", over="1 s")
+    >>> ds = rv.simulate(wave, rv.elastic(1e6), press, times=3, progress=False)
+    >>> figure = rv.plot.maps(ds, times="1 s", fields="pressure")
     """
     dataset = expect_result(dataset, "x", "y")
     fields = listed_names(fields)
@@ -402,6 +414,23 @@ def section(dataset: xr.Dataset, time: Any = None, axis: str = "x", at: Quantity
     Returns
     -------
     matplotlib.figure.Figure
+
+    Raises
+    ------
+    InputError
+        If the result lacks a field, or `time`, `axis` or `at` is invalid.
+
+    See Also
+    --------
+    roughvisc.plot.maps
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> wave = rv.wavy("1 um", "0.1 mm", "0.1 mm", 16)
+    >>> press = rv.Program().pressure("20 kPa", over="1 s")
+    >>> ds = rv.simulate(wave, rv.elastic(1e6), press, times=3, progress=False)
+    >>> figure = rv.plot.section(ds, time="1 s")
     """
     dataset = expect_result(dataset, "x", "y", "height", "pressure", "gap")
     one_of("axis", axis, ("x", "y"))
@@ -462,6 +491,22 @@ def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, rate: Q
     ------
     InputError
         If the suffix is not supported, ffmpeg is missing, or the result does not hold the field.
+
+    See Also
+    --------
+    roughvisc.plot.maps, roughvisc.plot.page
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> wave = rv.wavy("1 um", "0.1 mm", "0.1 mm", 16)
+    >>> press = rv.Program().pressure("20 kPa", over="1 s")
+    >>> ds = rv.simulate(wave, rv.elastic(1e6), press, times=3, progress=False)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     size = rv.plot.animate(ds, f"{folder}/wave.gif", rate=4).stat().st_size
+    >>> size > 0
+    True
     """
     path = path_of(path, "path")
     name = field or ("pressure" if "pressure" in dataset else "gap")
@@ -503,10 +548,26 @@ def surface(height: xr.DataArray | xr.Dataset, cutoff: Quantity | None = None) -
     -------
     matplotlib.figure.Figure
 
+    Raises
+    ------
+    InputError
+        If `height` is not a height grid, or the cut-off is not a length.
+
+    See Also
+    --------
+    roughvisc.inspect, roughvisc.psd, roughvisc.parameters
+
     Notes
     -----
     Map and profile show the given heights. Distribution and spectrum show the heights minus their mean plane.
     :func:`roughvisc.psd` computes the spectrum with a Hann window, after missing points are filled.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rough = rv.self_affine("1 mm", 32, hurst=0.8, rms_height="1 um", seed=1)
+    >>> len(rv.plot.surface(rough).axes) >= 4
+    True
     """
     if isinstance(height, xr.Dataset):
         need(height, "height")

@@ -43,6 +43,24 @@ def master_curve(material: Prony | Creep) -> Figure:
     ------
     InputError
         If the material is not of such a table.
+
+    See Also
+    --------
+    roughvisc.dynamic_table, roughvisc.read_material
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import roughvisc as rv
+    >>> w = np.tile(np.logspace(-1, 1, 5), 2)
+    >>> shifted = w * np.repeat([1.0, 0.1], 5)  # a Maxwell fluid, ten times as fast at the second temperature
+    >>> storage, loss = 1e6 * shifted**2 / (1 + shifted**2), 1e6 * shifted / (1 + shifted**2)
+    >>> fluid = rv.dynamic_table(
+    ...     w, storage, loss, frequency_unit="rad/s", kind="shear", temperatures=[293.15] * 5 + [313.15] * 5,
+    ...     temperature="20 degC", vertical="none",
+    ... )
+    >>> len(rv.plot.master_curve(fluid).axes) >= 2
+    True
     """
     law = getattr(material, "thermal", None)
     superposed = getattr(law.shift, "__self__", None) if isinstance(law, ThermalLaw) else None

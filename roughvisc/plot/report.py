@@ -19,6 +19,7 @@ import xarray as xr
 from jinja2 import Environment, PackageLoader
 from matplotlib.figure import Figure
 
+from roughvisc.arguments import count
 from roughvisc.errors import InputError
 from roughvisc.judge.audit import audit_of
 from roughvisc.labels import cost_of, grid_error_of, warnings_of
@@ -45,17 +46,18 @@ _DPI, _WIDE = 110, 5.5
 _PARAMETERS = ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdq", "Sdr", "missing_fraction")
 
 
-def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, processes: int = 1) -> Path:
+def report(results: str | Path | xr.Dataset, path: str | Path | None = None, *, workers: int | None = 0) -> Path:
     """Write a page that shows results: cases, accuracy, figures, surface, assumptions, and how to repeat them.
 
     Parameters
     ----------
     results : path or xarray.Dataset
         A result file, a folder of result files, or one case's result.
-    out : path, optional
+    path : path, optional
         File to write. Default: ``report.html`` in the folder of results, or ``STEM-report.html`` next to a result file.
-    processes : int
-        Number of processes that draw the figures. Several processes need a main module that may be imported again.
+    workers : int
+        Number of processes that draw the figures; 0: this process. Processes need a main module that may be imported
+        again.
 
     Returns
     -------
@@ -66,7 +68,23 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
     Raises
     ------
     InputError
-        If there are zero results, or a Dataset comes without `out`.
+        If there are zero results, or a Dataset comes without `path`.
+
+    See Also
+    --------
+    roughvisc.plot.page, roughvisc.to_table
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball = rv.sphere(radius=1e-3, size=2e-4, shape=15)
+    >>> press = rv.Program().load(1e-4, over=0)
+    >>> ds = rv.simulate(ball, rv.elastic(1e6), press, times=[0.0], fields=(), progress=False)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     page = rv.report(ds, f"{folder}/ball.html").read_text(encoding="utf-8")
+    >>> "<html" in page
+    True
     """
     page: dict[str, Any] = {
         "rows": "times or speeds",
@@ -75,11 +93,12 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
         "words": case_words,
         "text": _text,
     }
-    out = out if out is None else path_of(out, "out")
+    out = None if path is None else path_of(path, "path")
+    count("workers", workers, 0)
     sources, numbers, histories = [results], {}, {}
     if isinstance(results, xr.Dataset):
         if out is None:
-            raise InputError("out is None: expected the name of the page, if a Dataset is given")
+            raise InputError(key="path", found=None, expected="the name of the page, if a Dataset is given")
     elif (folder := path_of(results, "results")).is_dir():
         out = out or folder / "report.html"
         sources, failed = result_files(folder), (path.name.partition(".")[0] for path in folder.glob("*.failed.json"))
@@ -99,7 +118,7 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
         (one if i in shown else histories.get(one.stem, one), i, i in shown, i in drawn_cases)
         for i, one in enumerate(sources)
     ]
-    page["cases"] = in_parallel(_case, jobs, processes, "report")
+    page["cases"] = in_parallel(_case, jobs, workers or 0, "report")
     drawn = set()
     for number, case in enumerate(page["cases"]):
         case["number"] = numbers.get(case["key"], "") if numbers else number

@@ -78,14 +78,14 @@ class _Thinning:
         return _Thinning(max(rows, 1), max(cells, 8))
 
 
-def page(results: str | Path | xr.Dataset, out: str | Path | None = None) -> Path:
+def page(results: str | Path | xr.Dataset, path: str | Path | None = None) -> Path:
     """Write a page to explore results: fields, profiles and histories of every case, in any browser.
 
     Parameters
     ----------
     results : path or xarray.Dataset
         A result file, a folder of result files, one case's result, or a sweep.
-    out : path, optional
+    path : path, optional
         File to write. Default: ``page.html`` in the folder of results, ``STEM-page.html`` next to a result file, or
         ``page.html`` in this folder for a Dataset.
 
@@ -100,13 +100,29 @@ def page(results: str | Path | xr.Dataset, out: str | Path | None = None) -> Pat
     InputError
         If there are zero results, or something else than a result.
 
+    See Also
+    --------
+    roughvisc.report, roughvisc.plot.animate
+
     Notes
     -----
     The page shows every field over (time, x, y) or (speed, x, y) in the results. For the flow of a fluid, merge it:
     ``rv.plot.page(ds.merge(rv.observables.leakage(ds, flow=True)))``.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> wave = rv.wavy("1 um", "0.1 mm", "0.1 mm", 16)
+    >>> press = rv.Program().pressure("20 kPa", over="1 s")
+    >>> ds = rv.simulate(wave, rv.elastic(1e6), press, times=3, progress=False)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     page = rv.plot.page(ds, f"{folder}/wave.html").read_text(encoding="utf-8")
+    >>> "<html" in page
+    True
     """
     sources, default = _sources(results)
-    out = default if out is None else path_of(out, "out")
+    out = default if path is None else path_of(path, "path")
     thinning = _Thinning(max(source.rows for source in sources), MOST_CELLS)
     while True:
         cases, size = _cases(sources, thinning)

@@ -90,6 +90,21 @@ def sweep(results: xr.Dataset, quantity: str | None = None, *, along: str | None
     ------
     InputError
         If the results are not a sweep, or a name is unknown.
+
+    See Also
+    --------
+    roughvisc.sweep, roughvisc.plot.history
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=15), rv.Program().load(1e-5, over="1 s")
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
+    >>> cases = rv.vary(case, {"tolerance": [0.1, 0.01]})
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     results = rv.sweep(cases, folder, workers=0, progress=False).load()
+    >>> figure = rv.plot.sweep(results, "approach", along="tolerance")
     """
     if not isinstance(results, xr.Dataset) or results.sizes.get("case", 1) * results.sizes.get(REALISATION, 1) < 2:
         raise InputError("expected the Dataset of rv.open_results or rv.sweep, with several cases")

@@ -49,9 +49,21 @@ def to_table(out: str | Path) -> pd.DataFrame:
     InputError
         If the folder contains no result, or `out` is not a path.
 
+    See Also
+    --------
+    roughvisc.open_results, roughvisc.to_csv
+
     Examples
     --------
-    >>> rv.to_table("results/load_sweep").to_excel("load_sweep.xlsx")  # doctest: +SKIP
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=15), rv.Program().load(1e-5, over="1 s")
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ds = rv.run(case, folder, progress=False).load()
+    ...     table = rv.to_table(folder)
+    >>> table["status"].tolist()
+    ['converged']
     """
     folder = path_of(out, "out", "a folder of results; rv.to_csv takes a Dataset").absolute()
     index, cases = index_of(folder), read_sweep(folder)
@@ -121,9 +133,21 @@ def to_csv(dataset: xr.Dataset, path: str | Path) -> Path:
     InputError
         If the Dataset is not one case's result, or the folder cannot be written to.
 
+    See Also
+    --------
+    roughvisc.to_table, roughvisc.save_result
+
     Examples
     --------
-    >>> rv.to_csv(rv.open_result("results/quickstart/cc981638f27a0782.nc"), "quickstart.csv")  # doctest: +SKIP
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball = rv.sphere(radius=1e-3, size=2e-4, shape=33)
+    >>> press = rv.Program().load(1e-4, over=0)
+    >>> ds = rv.simulate(ball, rv.elastic(1e6), press, times=[0.0], progress=False)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     text = rv.to_csv(ds, f"{folder}/ball.csv").read_text()
+    >>> text.startswith("time [s],")
+    True
     """
     dataset = expect_result(dataset)
     rows = axis_of(dataset)

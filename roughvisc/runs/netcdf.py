@@ -95,10 +95,26 @@ def open_result(path: str | Path) -> xr.Dataset:
     DamagedError
         If the content of the file is damaged.
 
+    See Also
+    --------
+    roughvisc.run, roughvisc.save_result, roughvisc.open_results
+
     Notes
     -----
     Every block of a variable has a checksum (fletcher32), which is verified when the block is read. This function reads
     only the histories. :func:`verify` reads all blocks.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball = rv.sphere(radius=1e-3, size=2e-4, shape=33)
+    >>> press = rv.Program().load(1e-4, over=0)
+    >>> ds = rv.simulate(ball, rv.elastic(1e6), press, times=[0.0], progress=False)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     again = rv.open_result(rv.save_result(ds, f"{folder}/ball.nc")).load()
+    >>> bool((again.pressure == ds.pressure).all())
+    True
     """
     return _opened(path_of(path, "path", "a result"))
 

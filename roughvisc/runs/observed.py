@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,13 @@ import xarray as xr
 
 from roughvisc.errors import InputError
 from roughvisc.observables import OBSERVABLES
+from roughvisc.progress import reporting
 from roughvisc.runs.cluster import default_client, require_synchronous
 from roughvisc.runs.csv_files import update_table
 from roughvisc.runs.folder import case_path, lock_case
 from roughvisc.runs.netcdf import open_result, write_result
 from roughvisc.runs.run import result_folder
+from roughvisc.solve import Progress
 from roughvisc.study.case import Case, cases_given
 
 log = logging.getLogger("roughvisc")
@@ -29,7 +32,7 @@ def observe(
     cases: Sequence[Case] | str | Path,
     out: str | Path | None = None,
     *,
-    progress: Callable[[int, int], None] | None = None,
+    progress: bool | Progress = True,
 ) -> list[Path]:
     """Compute the quantities in ``[observe]`` of a study from its finished results, and add them to the files.
 
@@ -44,8 +47,8 @@ def observe(
         Cases, or their study file. Unfinished cases are skipped.
     out : path, optional
         Results folder. Default: ``results/`` and the name of the study, next to the study.
-    progress : callable, optional
-        Called with the number of finished cases and the total number.
+    progress : bool or callable
+        A progress bar, or a function called with the number of finished cases and the total number.
 
     Returns
     -------
@@ -56,18 +59,39 @@ def observe(
     ------
     InputError
         If a quantity cannot be computed from a result; its file is not changed. If the default client is asynchronous.
+
+    See Also
+    --------
+    roughvisc.run, roughvisc.sweep, roughvisc.observables
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=15), rv.Program().load(1e-5, over="1 s")
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ds = rv.run(case, folder, progress=False).load()
+    ...     asked = rv.vary(case, {"observe": {"conductance": {"resistivity": ["0.2 K m/W", 0]}}})
+    ...     changed = rv.observe([asked], folder, progress=False)
+    >>> len(changed)
+    1
     """
     cases = cases_given(cases)
     distinct = {case.key: case for case in cases if case.observed}
     folder = result_folder(cases[0], out).absolute()
     require_synchronous(default_client())
     added = []
-    for number, case in enumerate(distinct.values()):
-        if progress is not None:
-            progress(number, len(distinct))
-        path = case_path(folder, case.key, "result")
-        if path.exists() and _add(case, path):
-            added.append(path)
+    bar: AbstractContextManager[Progress | None] = nullcontext(progress if callable(progress) else None)
+    if progress is True and distinct:
+        bar = reporting("observing", lambda done, count: f"{done:.0f} of {count:.0f} cases")
+    with bar as report:
+        for number, case in enumerate(distinct.values()):
+            if report is not None:
+                report(number, len(distinct))
+            path = case_path(folder, case.key, "result")
+            if path.exists() and _add(case, path):
+                added.append(path)
     if added and len(cases) > 1:
         update_table(folder)
     return added

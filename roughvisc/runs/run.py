@@ -17,7 +17,7 @@ from itertools import filterfalse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from roughvisc.arguments import split
+from roughvisc.arguments import count, split
 from roughvisc.errors import InputError, RoughviscError
 from roughvisc.experiment.problem import Problem
 from roughvisc.labels import warnings_of
@@ -187,6 +187,7 @@ def _run(
     threads: int | None = None,
 ) -> tuple[Path, Entry | None]:
     """Run one case unless its file exists; return the path, and the entry of a file that was written now."""
+    count("threads", threads, 1)
     path = case_path(folder, case.key, "result")
     entry = None
     if is_result_of(case, path) and not any(folder.glob(f".{case.key}.*")):

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
+from roughvisc.arguments import count
 from roughvisc.errors import InputError, RoughviscError
 from roughvisc.labels import warnings_of
 from roughvisc.runs.cluster import (
@@ -39,7 +40,7 @@ from roughvisc.runs.folder import (
 )
 from roughvisc.runs.observed import observe
 from roughvisc.runs.run import FULL, REFUSED, Outcome, attempt, outcome_of, result_folder, run_case
-from roughvisc.runs.sweep_data import SWEEP, index_of, numbers_of, open_results, sweep_cases
+from roughvisc.runs.sweep_data import SWEEP, index_of, numbers_of, open_results, require_own_folder, sweep_cases
 from roughvisc.solve import Progress
 from roughvisc.study.case import Case, cases_given
 
@@ -95,12 +96,28 @@ def sweep(
     Raises
     ------
     InputError
-        If the input is invalid or the client asynchronous (nothing runs), the call is at the top level of a script,
-        some results lie over time and others over speed, or a quantity in ``[observe]`` cannot be computed from a
-        result (the results are kept).
+        If the input is invalid, the folder holds the sweep of another study, or the client is asynchronous (nothing
+        runs); if the call is at the top level of a script, or some results lie over time and others over speed; or if a
+        quantity in ``[observe]`` cannot be computed from a result (the results are kept).
     RoughviscError
         If no case could be finished. If some cases fail, they are recorded in the folder and logged as warnings. A case
         that needs more memory than its worker has is refused and not recorded, because it may fit elsewhere.
+
+    See Also
+    --------
+    roughvisc.vary, roughvisc.open_results, roughvisc.to_table, roughvisc.plot.sweep
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=15), rv.Program().load(1e-5, over="1 s")
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
+    >>> cases = rv.vary(case, {"material.shear_modulus": ["2 MPa", "4 MPa"]})
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     results = rv.sweep(cases, folder, workers=0, progress=False).load()
+    >>> results.material_shear_modulus.values.tolist()
+    [2000000.0, 4000000.0]
     """
     cases = cases_given(cases)
     folder = result_folder(cases[0], out).absolute()
@@ -129,10 +146,12 @@ def run_one(case: Case, folder: Path, *, progress: bool | Progress = False, thre
     Raises
     ------
     InputError
-        If a quantity cannot be computed from the result, which is kept; and as :func:`run_case`.
+        If the folder holds the sweep of another study; if a quantity cannot be computed from the result, which is
+        kept; and as :func:`run_case`.
     """
+    require_own_folder([case], folder)
     path = run_case(case, folder, progress=progress, threads=threads)
-    observe([case], folder)
+    observe([case], folder, progress=False)
     return path
 
 
@@ -144,13 +163,15 @@ def run_study(
     Raises
     ------
     InputError
-        If a quantity cannot be computed from a result, which is kept; and as :func:`run_cases`.
+        If the folder holds the sweep of another study; if a quantity cannot be computed from a result, which is kept;
+        and as :func:`run_cases`.
     """
+    require_own_folder(cases, folder)
     outcomes = run_cases(cases, folder, display=display, client=client, **computing)
     if any(case.observed for case in cases):
         display.say("computes the quantities in [observe]")
         with client.as_current() if client is not None else nullcontext():
-            observe(cases, folder)
+            observe(cases, folder, progress=False)
     return outcomes
 
 
@@ -181,8 +202,9 @@ def run_cases(
     KeyboardInterrupt
         If interrupted; running cases finish their step first.
     """
-    if workers is not None and (client is not None or workers < 0):
-        raise InputError(key="workers", found=workers, expected="0 or more, and none together with a client")
+    count("threads", threads, 1)
+    if count("workers", workers, 0) is not None and client is not None:
+        raise InputError(key="workers", found=workers, expected="None together with a client")
     require_synchronous(client)
     distinct, folder = {case.key: case for case in cases}, folder.absolute()
     require_writable(folder, "for the results")

@@ -36,7 +36,7 @@ from roughvisc.runs.folder import (
     write_json,
 )
 from roughvisc.runs.netcdf import lazy, open_result, open_without_steps, read_variable
-from roughvisc.study.case import Case, identifier, labels_of, parameters_of
+from roughvisc.study.case import Case, cases_given, identifier, labels_of, parameters_of
 from roughvisc.study.sweep_table import DRAWN, REALISATION
 from roughvisc.variables import AXES, ROW, ROWS, VARIABLES, axis_of
 from roughvisc.version import program_version
@@ -243,6 +243,36 @@ def read_sweep(folder: Path) -> dict[str, dict[str, Any]]:
         raise InputError(f"{path}: {found}: expected the cases of a sweep; run it again", key=SWEEP) from error
 
 
+def require_own_folder(cases: Sequence[Case], folder: Path) -> None:
+    """Refuse a folder with the sweep of another study, whose list and table of cases the results would replace.
+
+    A study that has changed has the same title or the same name of its file. Results of single cases do not count,
+    because each has its own name.
+
+    Raises
+    ------
+    InputError
+        If the last sweep in the folder is one of another study.
+    """
+    listed: dict[str, dict[str, Any]] = {}
+    with suppress(InputError):  # a damaged list belongs to no study
+        listed = read_sweep(folder)
+    if not listed or any(case.key in listed for case in cases):
+        return
+    own = set().union(*(_names(case.title, case.origin) for case in cases))
+    other = set().union(*(_names(stated.get("title"), stated.get("origin")) for stated in listed.values()))
+    if own & other:
+        return
+    holds, expected = f"holds the sweep of {', '.join(sorted(other))}", "a folder of this study, or a new one"
+    raise InputError(f"out: {folder}: {holds}: expected {expected}", key="out", found=str(folder), expected=expected)
+
+
+def _names(title: str | None, origin: str | Path | None) -> set[str]:
+    """Return the title and the name of the file of a study, by which it is recognised after a change."""
+    names = {title or "untitled", Path(origin).name if origin else ""} - {""}
+    return names - {"untitled"} or names
+
+
 def numbers_of(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, int]:
     """Return the number of each case, from 0 in their order; the realisations of one case share its number."""
     numbers: dict[str, int] = {}
@@ -254,16 +284,16 @@ def numbers_of(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, int]:
     return found
 
 
-def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.Dataset:
+def open_results(out: str | Path, *, cases: Sequence[Case] | str | Path | None = None) -> xr.Dataset:
     """Open all results of a sweep together; fields are read when they are needed.
 
     Parameters
     ----------
     out : path
         Folder of the results.
-    cases : sequence of Case, optional
-        Cases whose results to open, in this order. Default: the cases of the last sweep in this folder, or all results
-        if no sweep ran in it.
+    cases : sequence of Case, or path, optional
+        Cases whose results to open, in this order, or their study file. Default: the cases of the last sweep in this
+        folder, or all results if no sweep ran in it.
 
     Returns
     -------
@@ -291,14 +321,26 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.
     InputError
         If the folder contains no result, or some results lie over time and others over speed.
 
+    See Also
+    --------
+    roughvisc.sweep, roughvisc.to_table, roughvisc.open_result
+
     Examples
     --------
-    >>> results = rv.open_results("results/load_sweep")  # doctest: +SKIP
-    >>> results.set_index(case=["program_0_load", "surface_seed"]).unstack("case").contact_area  # doctest: +SKIP
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=15), rv.Program().load(1e-5, over="1 s")
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
+    >>> cases = rv.vary(case, {"tolerance": [1e-1, 1e-2]})
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     first = rv.run(cases[0], folder, progress=False)
+    ...     results = rv.open_results(folder, cases=cases).load()
+    >>> results.case.values.tolist()  # the second case is not finished
+    [0]
     """
     folder = path_of(out, "out", "a folder of results").absolute()
     index = index_of(folder)
-    listed = read_sweep(folder) if cases is None else sweep_cases(cases, folder)
+    listed = read_sweep(folder) if cases is None else sweep_cases(cases_given(cases), folder)
     listed = listed or {key: entry.case for key, entry in index.items()}
     here = [place for place, key in enumerate(listed) if key in index]
     if not here:

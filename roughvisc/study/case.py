@@ -33,7 +33,7 @@ from roughvisc.mechanics.materials.models import creep_series
 from roughvisc.mechanics.program import Program
 from roughvisc.paths import atomic_write, path_of
 from roughvisc.settings import Boundary, Edge, Missing, Numerics, Settings
-from roughvisc.study.case_text import study_text, value_text
+from roughvisc.study.case_text import case_html, study_text, value_text
 from roughvisc.study.identity import (
     area_of,
     body_identity,
@@ -92,8 +92,8 @@ class Case:
     surface : xarray.DataArray, dims (x, y)
         Heights, as in :func:`roughvisc.simulate`. [m]
     material : Material or Body
-        Material of a half-space, or a body, as in :func:`roughvisc.simulate`. The case has the series that the run uses
-        in place of a function from :func:`roughvisc.creep`.
+        Material of a half-space, or a body, as in :func:`roughvisc.simulate`. The series that a
+        run uses replaces a function from :func:`roughvisc.creep`.
     program : Program or SteadySliding
         Load, nominal pressure or approach against time, or steady sliding, with its speeds in increasing order.
     title : str
@@ -207,7 +207,9 @@ class Case:
 
     def with_fields(self, **changes: Any) -> Case:
         """Return the case with other values of some attributes, which are not checked."""
-        return _made({one.name: getattr(self, one.name) for one in dataclasses.fields(self)} | changes)
+        return _made(
+            {attribute.name: getattr(self, attribute.name) for attribute in dataclasses.fields(self)} | changes
+        )
 
     def __repr__(self) -> str:
         """Return title, surface, material, experiment and varied values in one line."""
@@ -215,6 +217,16 @@ class Case:
         parts = [f"{self.title!r}, {name} on {self.tables['material']['model']}", repr(self.experiment)]
         parts += [f"{key} = {value_text(key, value)}" for key, value in self.varied.items()]
         return f"Case {'; '.join(parts)}"
+
+    def _repr_html_(self) -> str:
+        """Return the case as a table, for a notebook."""
+        named = ("title", "surface", "material", "program", "friction")
+        others = {name: table for name, table in self.tables.items() if name not in named}
+        rows = {"surface": self.surface, "material": self.tables["material"], "experiment": repr(self.experiment)}
+        rows |= others | {"key": self.key}
+        if self.varied:
+            rows["varied"] = ", ".join(f"{key} = {value_text(key, value)}" for key, value in self.varied.items())
+        return case_html(f"Case {self.title!r}", rows)
 
     @property
     def surface(self) -> Mapping[str, Any]:
@@ -238,7 +250,8 @@ class Case:
     @property
     def shift_factor(self) -> float:
         """Factor of all times of the material at its temperature. [-]"""
-        factor, law = shift_factor(self.tables["material"]), self.material.thermal
+        factor = shift_factor(self.tables["material"])
+        law = self.material.thermal
         is_measured = "temperatures" in self.tables["material"] and isinstance(law, ThermalLaw)
         return factor * law.shift(law.temperature) if is_measured else factor
 
@@ -286,7 +299,7 @@ class Case:
         stated = [
             surface_identity(self.surface, self.checksums),
             body_identity(self.body),
-            experiment_identity(self.experiment, area_of(self.surface)),
+            experiment_identity(self.experiment, area_of(self.surface, self.heights)),
             settings_identity(self.settings),
             NUMERICS_REVISION,
         ]
@@ -304,7 +317,8 @@ class Case:
         """
         from roughvisc.experiment.memory_limit import require_surface  # slow to import
 
-        before, source = self.checksums, str(self.origin or "case")
+        before = self.checksums
+        source = str(self.origin or "case")
         try:
             if "shape" in self.surface:
                 require_surface(self.surface["shape"])
@@ -341,7 +355,7 @@ class Case:
         text : str
             The JSON.
         folder : Path, optional
-            Folder of relative paths, that of the result.
+            Folder of the result, to which paths are relative.
         """
         try:
             data = dict(json.loads(text))
@@ -349,7 +363,8 @@ class Case:
             raise InputError(f"not a case written by to_json: {error}") from error
         if folder:
             data = _with_paths(data, lambda path: os.path.normpath(folder.absolute() / path))
-        origin, varied = data.pop("origin", None), data.pop("varied", {})
+        origin = data.pop("origin", None)
+        varied = data.pop("varied", {})
         return _case_of(data, origin and Path(origin)).with_fields(varied=varied)
 
     def stored(self, folder: Path) -> Case:
@@ -400,7 +415,7 @@ def _made(values: Mapping[str, Any]) -> Case:
 def _with_paths(stated: Any, change: Callable[[str], str], key: str = "") -> Any:
     """Return tables in which the paths of files are changed."""
     if isinstance(stated, Mapping):
-        return {name: _with_paths(one, change, name) for name, one in stated.items()}
+        return {name: _with_paths(inner, change, name) for name, inner in stated.items()}
     is_path = key == "origin" or key.rpartition(".")[2] == "file"
     return change(stated) if is_path and isinstance(stated, str) else stated
 
@@ -432,10 +447,26 @@ def read_study(path: str | Path) -> Case:
     InputError
         If the file cannot be read, if a key or a value is unknown, missing, impossible or in a wrong unit, or if the
         file contains a sweep: see :func:`read_cases`.
+
+    See Also
+    --------
+    roughvisc.read_cases, roughvisc.Case
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=15), rv.Program().load(1e-5, over="1 s")
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     again = rv.read_study(case.to_toml(f"{folder}/ball.toml"))
+    >>> again.key == case.key
+    True
     """
     cases = read_cases(path)
     if len(cases) > 1 or cases[0].varied:
-        found, expected = f"{len(cases)} cases", "one; read_cases() reads them all"
+        found = f"{len(cases)} cases"
+        expected = "one; read_cases() reads them all"
         raise InputError(key="sweep", found=found, expected=expected).prefixed(str(path))
     return cases[0]
 
@@ -453,7 +484,7 @@ def read_cases(path: str | Path) -> list[Case]:
     path : path
         A TOML file; files that it names are sought relative to it.
 
-    In a sweep over programs a case leaves out the times of ``keep.times`` after the end of its own program.
+    In a sweep over programs a case leaves out the times of ``keep.times`` after the end of its program.
 
     Returns
     -------
@@ -464,6 +495,24 @@ def read_cases(path: str | Path) -> list[Case]:
     ------
     InputError
         As :func:`read_study` does, for the first case that is wrong; or if a time is after the end of every program.
+
+    See Also
+    --------
+    roughvisc.read_study, roughvisc.vary, roughvisc.sweep
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> ball, press = rv.sphere(radius=1e-3, size=2e-4, shape=15), rv.Program().load(1e-5, over="1 s")
+    >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     study = case.to_toml(f"{folder}/ball.toml")
+    ...     with study.open("a") as file:
+    ...         _ = file.write('[sweep]\\n"program.0.load" = ["5 uN", "10 uN"]\\n')
+    ...     cases = rv.read_cases(study)
+    >>> [one.varied for one in cases]
+    [{'program.0.load': 5e-06}, {'program.0.load': 1e-05}]
     """
     path = path_of(path, "path", "a study file")
     data = read_toml(path, "a study in TOML")
@@ -553,14 +602,14 @@ def vary(case: Case, changes: Mapping[str, Any], *, zip: bool = False) -> Any:
     """
     case = case_given(case)
     choices = {key: _choices(key, value) for key, value in a_table("changes", changes).items()}
-    lengths = {key: len(one) for key, one in choices.items() if one is not None}
+    lengths = {key: len(options) for key, options in choices.items() if options is not None}
     if not lengths:
         return changed(case, changes)
     if zip and len(set(lengths.values())) > 1:
         raise InputError(key="changes", found=lengths, expected="lists of one length")
     if (count := max(lengths.values()) if zip else math.prod(lengths.values())) > MOST_CASES:
         raise InputError(key="changes", found=f"{count} cases", expected=f"at most {MOST_CASES}")
-    lists = [one or [("", changes[key])] * (count if zip else 1) for key, one in choices.items()]
+    lists = [options or [("", changes[key])] * (count if zip else 1) for key, options in choices.items()]
     chosen = builtins.zip(*lists, strict=True) if zip else itertools.product(*lists)
     cases = []
     for values in chosen:
@@ -575,20 +624,20 @@ def _choices(key: str, value: Any) -> list[tuple[str, Any]] | None:
     """Return the names and values to choose from; None for a single value."""
     if isinstance(value, Mapping):
         parts = list(value.values())
-        of_objects = key in _OBJECTS and all(isinstance(one, Mapping) or _is_object(key, one) for one in parts)
+        of_objects = key in _OBJECTS and all(isinstance(choice, Mapping) or _is_object(key, choice) for choice in parts)
         if not value or not (of_objects or key.rpartition(".")[2] in TABLE_OF):
             return None
-        return [(str(name), one) for name, one in value.items()]
+        return [(str(name), choice) for name, choice in value.items()]
     if not isinstance(value, list):
         return None
-    several = [isinstance(one, list | tuple) or _is_object(key, one) for one in value]
+    several = [isinstance(choice, list | tuple) or _is_object(key, choice) for choice in value]
     if key.rpartition(".")[2] in _LISTS and not (value and all(several)):
         return None
     if not value:
         raise InputError(key=key, found=value, expected="at least one value; a tuple is one value")
     names = ["" for _ in value]
-    if key in _OBJECTS and all(_is_object(key, one) for one in value):
-        names = [str(place) if key == "surface" else short_repr(one) for place, one in enumerate(value)]
+    if key in _OBJECTS and all(_is_object(key, choice) for choice in value):
+        names = [str(place) if key == "surface" else short_repr(choice) for place, choice in enumerate(value)]
         for name, count in Counter(names).items():
             if count > 1:
                 raise InputError(key=key, found=name, expected=f"different names, not {count} equal ones: a dictionary")
@@ -618,7 +667,8 @@ def changed(
     leaves_out : bool
         Whether to leave out times after the end of a changed program, instead of refusing them.
     """
-    heights, function = case.heights, case.function
+    heights = case.heights
+    function = case.function
     placed: dict[str, Any] = {}
     written: dict[str, str] = {}
     refuse_unknown("", {key: value for key, value in changes.items() if "." not in key}, (*TABLES, *TABLE_OF))
@@ -638,23 +688,23 @@ def changed(
             written[dotted_key] = key
     folder = case.origin and case.origin.parent
     try:
-        found = _case_of(case.tables, case.origin, folder, placed, leaves_out=leaves_out, heights=heights)
+        made = _case_of(case.tables, case.origin, folder, placed, leaves_out=leaves_out, heights=heights)
         if function is not None:
-            table = material_table(function, found.experiment, found.settings)
-            late = found.late_times
-            found = _case_of(found.tables, case.origin, folder, {"material": table}, heights=heights)
+            table = material_table(function, made.experiment, made.settings)
+            late = made.late_times
+            made = _case_of(made.tables, case.origin, folder, {"material": table}, heights=heights)
             is_series = table["model"] == creep_series.__name__
-            found = found.with_fields(late_times=late, function=function if is_series else None)
+            made = made.with_fields(late_times=late, function=function if is_series else None)
     except InputError as error:
         stated = as_written(error, {key: key.rpartition(".")[0] for key, own in written.items() if own != key})
         raise (stated.prefixed(str(case.origin)) if case.origin else stated) from error
     varied = {}
     for key in changes:
         stated = f"{TABLE_OF[key]}.{key}" if key in TABLE_OF else key
-        varied[key] = names.get(key) or value_at(found.tables, stated, changes[key])
+        varied[key] = names.get(key) or value_at(made.tables, stated, changes[key])
         if _is_object(key, changes[key]):
             varied[key] = names.get(key) or short_repr(changes[key])
-    return found.with_fields(varied={**case.varied, **varied})
+    return made.with_fields(varied={**case.varied, **varied})
 
 
 def _plain_value(value: Any) -> Any:
@@ -686,8 +736,8 @@ def as_written(error: InputError, tables: Mapping[str, str]) -> InputError:
     if table not in (tables.get(name), tables.get(f"{table}.{name}")) or not rest:
         return error
     message = str(error)
-    at = message.find(error.key)
-    message = message[:at] + message[at + len(table) + 1 :] if at >= 0 else f"{rest}: {message}"
+    start = message.find(error.key)
+    message = message[:start] + message[start + len(table) + 1 :] if start >= 0 else f"{rest}: {message}"
     return type(error)(message, key=rest, found=error.found, expected=error.expected, transient=error.transient)
 
 
@@ -724,7 +774,9 @@ def _case_of(
         data = place(data, key, value)
     named, surface = split(a_table("surface", data.get("surface", {})), "file")
     if heights is None or digest_in(named.get("file", "")) != digest_in(file_name(heights)):
-        named, surface, heights = {}, data.get("surface"), None
+        named = {}
+        surface = data.get("surface")
+        heights = None
     try:
         tables = with_files({**data, "surface": surface} if heights is not None else data, folder)
         tables["surface"] |= named

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import math
 import re
@@ -15,7 +16,10 @@ from roughvisc.topography.scans import toml_text
 from roughvisc.units import unit_for
 
 #: Longest stem of a file name, and number of letters of a key that make it unique.
-_LONGEST, _KEY = 80, 8
+_LONGEST = 80
+_KEY = 8
+#: Largest number of values of a list that a table shows in full.
+_LISTED = 6
 
 
 def study_text(case: Mapping[str, Any]) -> str:
@@ -36,11 +40,12 @@ def study_text(case: Mapping[str, Any]) -> str:
     shear_modulus = 1000000.0
     <BLANKLINE>
     """
-    text, tables = "", ""
+    text = ""
+    tables = ""
     for name, value in case.items():
         if name in ("origin", "varied"):
             continue
-        several = isinstance(value, list) and any(isinstance(one, dict) for one in value)
+        several = isinstance(value, list) and any(isinstance(item, dict) for item in value)
         if not (several or isinstance(value, dict)):
             text += f"{name} = {toml_text(value)}\n"
             continue
@@ -103,6 +108,37 @@ def case_words(case: Mapping[str, Any]) -> str:
     return words[:1].upper() + words[1:]
 
 
+def case_html(title: str, rows: Mapping[str, Any]) -> str:
+    """Return a case as a table in HTML, for a notebook.
+
+    Parameters
+    ----------
+    title : str
+        Title of the case.
+    rows : mapping
+        Name of each row -> its text, or a table of the study in SI, whose values get suitable units.
+    """
+    lines = [f"<table><caption>{html.escape(title)}</caption>"]
+    for name, content in rows.items():
+        if isinstance(content, Mapping):
+            parts = [f"{key.replace('_', ' ')} {_texts(f'{name}.{key}', value)}" for key, value in content.items()]
+            content = "; ".join(parts)
+        left = "style='text-align:left'"
+        lines.append(f"<tr><th {left}>{html.escape(name)}</th><td {left}>{html.escape(content)}</td></tr>")
+    return "\n".join([*lines, "</table>"])
+
+
+def _texts(key: str, value: Any) -> str:
+    """Return a value or a list of values of a dotted key, in suitable units."""
+    if isinstance(value, list) and len(value) > _LISTED:
+        return f"{_texts(key, value[0])} to {_texts(key, value[-1])} ({len(value)} values)"
+    if isinstance(value, list):
+        return ", ".join(_texts(key, inner) for inner in value)
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name.replace('_', ' ')} {_texts(f'{key}.{name}', inner)}" for name, inner in value.items())
+    return value_text(key, value)
+
+
 def file_stems(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     """Return stems of file names of cases in portable letters: the varied values, or the title, or the key.
 
@@ -120,7 +156,8 @@ def file_stems(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     """
     stems = {}
     for key, case in cases.items():
-        texts, parts = varied_texts(case), []
+        texts = varied_texts(case)
+        parts = []
         names = names_of(list(texts))
         for dotted, text in texts.items():
             value = PurePath(text).stem if dotted.rpartition(".")[2] == "file" else text

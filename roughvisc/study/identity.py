@@ -1,6 +1,6 @@
-"""The key of a case: a digest of what is computed, however it was written.
+"""The key of a case: a digest of the computation, independent of its notation.
 
-Defaults, units, pairs of equal numbers, cards and the model of a material do not count; the numbers that they stand for
+Defaults, units, pairs of equal numbers, cards and the model of a material do not count; the numbers behind them
 do.
 """
 
@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import fields, is_dataclass, replace
 from inspect import Parameter
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,11 +29,14 @@ from roughvisc.mechanics.materials.material import Creep, Prony
 from roughvisc.settings import Settings, attraction
 from roughvisc.study.study_file import in_si
 from roughvisc.topography.conditioning import FACE_STEPS, STEPS
-from roughvisc.topography.heights import digest_in
+from roughvisc.topography.heights import area_in, digest_in
 from roughvisc.topography.readers import sha256
 from roughvisc.topography.recipes import RECIPES, finest_wave, self_affine
 from roughvisc.topography.scans import is_card, measured_file, open_scan, read_card
 from roughvisc.units import number
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: Arguments of a surface that one number or a pair states.
 _PAIRS = ("size", "spacing", "shape")
@@ -64,20 +67,20 @@ def digest(stated: Any) -> str:
 
 def checksums_of(surface: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return checksums of the scan or recipe of each face and of its surface card, without the origin of the card."""
-    found = []
+    checksums = []
     for face in filter(None, (surface, surface.get("second"))):
         if "file" not in face:
-            found.append((digest(_recipe(face)), ""))
+            checksums.append((digest(_recipe(face)), ""))
             continue
         path = Path(face["file"])
         card = split(read_card(path)[1], "file")[1] if is_card(path) else {}
         scan = measured_file(path)
         try:
             content = digest(card) if scan is None else digest_in(scan.name) or sha256(scan)
-            found.append((content, digest(card) if card else ""))
+            checksums.append((content, digest(card) if card else ""))
         except InputError as error:
             raise located(error, "surface.file") from error
-    return found
+    return checksums
 
 
 def surface_identity(surface: Mapping[str, Any], checksums: Sequence[tuple[str, str]]) -> list[Any]:
@@ -94,7 +97,9 @@ def _face(face: Mapping[str, Any], checksum: str, steps: Sequence[str] | Mapping
     """Return the source of a face and the steps of its card and its own, in the order in which they are applied."""
     if "file" not in face:
         return _with_steps([_recipe(face)], _steps(face, steps))
-    path, card, stages = Path(face["file"]), dict[str, Any](), list[dict[str, Any]]()
+    path = Path(face["file"])
+    card = dict[str, Any]()
+    stages = list[dict[str, Any]]()
     if is_card(path):
         card = in_si(read_card(path)[1], "surface", {})
         stages.append(_steps(card, STEPS))
@@ -115,30 +120,31 @@ def _with_steps(source: list[Any], *stages: dict[str, Any]) -> list[Any]:
 def _recipe(face: Mapping[str, Any]) -> list[Any]:
     """Return the name of a recipe and all its arguments."""
     recipe = RECIPES[face["generate"]]
-    found = _stated(recipe, split(face, *arguments(recipe))[0])
-    if recipe is self_affine and found["shortcut"] is None:
-        found["shortcut"] = finest_wave(found["size"], found["shape"], found["anisotropy"])
-    return [face["generate"], found]
+    stated = _stated(recipe, split(face, *arguments(recipe))[0])
+    if recipe is self_affine and stated["shortcut"] is None:
+        stated["shortcut"] = finest_wave(stated["size"], stated["shape"], stated["anisotropy"])
+    return [face["generate"], stated]
 
 
 def _steps(face: Mapping[str, Any], names: Sequence[str] | Mapping[str, Any]) -> dict[str, Any]:
     """Return all arguments of each step that is applied."""
-    found = {}
+    applied = {}
     for name in names:
-        value, step = face.get(name, False), STEPS[name]
+        value = face.get(name, False)
+        step = STEPS[name]
         if value is not False:
             table = value if isinstance(value, Mapping) else {} if value is True else {step.argument: value}
-            found[name] = _stated(step.function, table, 1)
-    return found
+            applied[name] = _stated(step.function, table, 1)
+    return applied
 
 
 def _stated(function: Callable[..., Any], table: Mapping[str, Any], first: int = 0) -> dict[str, Any]:
     """Return the arguments of a function with its defaults; a pair for a number that counts for x and y."""
-    found = {}
+    stated = {}
     for name, (_, default) in arguments(function, first).items():
         value = table.get(name, None if default is Parameter.empty else default)
-        found[name] = [value, value] if name in _PAIRS and isinstance(value, int | float) else value
-    return found
+        stated[name] = [value, value] if name in _PAIRS and isinstance(value, int | float) else value
+    return stated
 
 
 # ------------------------------------------------------------------------------------------------- body and experiment
@@ -173,12 +179,16 @@ def _is_converted(material: Prony | Creep) -> bool:
 def _plain(value: Any) -> Any:
     """Return a frozen value as lists of numbers and texts."""
     if is_dataclass(value) and not isinstance(value, type):
-        parts = {one.name: getattr(value, one.name) for one in fields(value) if one.compare or one.name == "stands_for"}
-        return [type(value).__name__, {name: _plain(part) for name, part in parts.items()}]
+        parts = {
+            attribute.name: getattr(value, attribute.name)
+            for attribute in fields(value)
+            if attribute.compare or attribute.name == "stands_for"
+        }
+        return [type(value).__name__, {name: _plain(inner) for name, inner in parts.items()}]
     if isinstance(value, Mapping):
-        return {name: _plain(part) for name, part in value.items()}
+        return {name: _plain(inner) for name, inner in value.items()}
     if isinstance(value, list | tuple | np.ndarray):
-        return [_plain(part) for part in value]
+        return [_plain(inner) for inner in value]
     return value.__name__ if callable(value) else value
 
 
@@ -192,10 +202,26 @@ def experiment_identity(experiment: Experiment, area: float | None) -> Any:
     return _plain(experiment)
 
 
-def area_of(surface: Mapping[str, Any]) -> float | None:
-    """Return the nominal area of a recipe; None for a scan and after steps that may change the area. [m2]"""
-    if "generate" not in surface or "second" in surface or any(surface.get(one, False) is not False for one in _RESIZE):
+def area_of(surface: Mapping[str, Any], heights: xr.DataArray | None = None) -> float | None:
+    """Return the nominal area of a recipe or of heights from Python; None for a scan, whose file is not read.
+
+    Parameters
+    ----------
+    surface : mapping
+        Table of the surface. After steps that may change the area it is None.
+    heights : xarray.DataArray, optional
+        Heights of the file that the surface names, which need not exist. [m]
+
+    Returns
+    -------
+    float or None
+        Area. [m2]
+    """
+    if "second" in surface or any(surface.get(name, False) is not False for name in _RESIZE):
         return None
+    if "generate" not in surface:
+        path = Path(surface["file"])
+        return area_in(path, heights) if digest_in(path.name) else None
     size = surface["size"]
     x, y = size if isinstance(size, list | tuple) else (size, size)
     return float(x) * float(y)
@@ -203,9 +229,9 @@ def area_of(surface: Mapping[str, Any]) -> float | None:
 
 def settings_identity(settings: Settings) -> dict[str, Any]:
     """Return the settings without defaults, and the fields in alphabetic order, each once."""
-    found: dict[str, Any] = {"fields": sorted(set(settings.fields))}
-    for one in fields(settings):
-        value = attraction(settings) if one.name == "adhesion" else getattr(settings, one.name)
-        if one.name != "fields" and value != one.default:
-            found[one.name] = _plain(value)
-    return found
+    stated: dict[str, Any] = {"fields": sorted(set(settings.fields))}
+    for setting in fields(settings):
+        value = attraction(settings) if setting.name == "adhesion" else getattr(settings, setting.name)
+        if setting.name != "fields" and value != setting.default:
+            stated[setting.name] = _plain(value)
+    return stated

@@ -52,6 +52,10 @@ def read_program(path: str | Path, **columns: Any) -> Program:
         If the file or a column cannot be read, times do not increase, or loads are below zero by more than noise (1 %
         of the largest load); the message names the line.
 
+    See Also
+    --------
+    roughvisc.Program, roughvisc.read_record
+
     Notes
     -----
     Columns may be separated by semicolons, tabs, commas or blanks. The heading is the first line that contains both
@@ -60,6 +64,17 @@ def read_program(path: str | Path, **columns: Any) -> Program:
     JPK has names and units in comments before each segment, such as ``"Series Time"`` and ``"Vertical Deflection"``.
 
     Adhesion is not modelled: a record with a pull-off ends at the end of its hold.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     with open(f"{folder}/machine.csv", "w") as file:
+    ...         _ = file.write("time [s]; load [mN]\\n0; 0\\n1; 2\\n2; 2\\n")
+    ...     program = rv.read_program(f"{folder}/machine.csv", time="time")
+    >>> program
+    Program: load to 2 mN over 1 s, load to 2 mN over 1 s
     """
     control, times, values, note = read_history(path, **columns)
     return Program.table(times, values, control, note)
@@ -85,19 +100,26 @@ def read_history(
     unit = UNITS[control]
     is_part = isinstance(thin, str) and is_quantity(thin, "1")
     limit = number(thin, "1" if is_part else unit, "thin", least=0)
-    offset, scale = number(zero, unit, "zero"), number(factor, "1", "factor")
-    found, lines = read_table(path, {"time": Wanted(time, "s"), control: Wanted(column, unit)})
-    measured = found["time"]
+    offset = number(zero, unit, "zero")
+    scale = number(factor, "1", "factor")
+    columns_read, lines = read_table(path, {"time": Wanted(time, "s"), control: Wanted(column, unit)})
+    measured = columns_read["time"]
     start = float(measured[0])
-    for at in np.flatnonzero(np.diff(measured) < 0)[:1] + 1:
-        told = f"time {measured[at]:g} s after {measured[at - 1]:g} s"
-        raise InputError(f"{path}, line {lines[at]}: {told}: expected increasing times")
-    for at in np.flatnonzero(measured[2:] == measured[:-2])[:1]:
-        told = f"lines {lines[at]} to {lines[at + 2]}: three rows at {measured[at]:g} s"
-        raise InputError(f"{path}, {told}: expected at most two, which are a jump; export more digits")
-    times, values = _less(measured, start), _less(found[control], offset) * scale
+    falls = np.diff(measured) < 0
+    if falls.any():
+        row = falls.argmax() + 1
+        times_of_rows = f"time {measured[row]:g} s after {measured[row - 1]:g} s"
+        raise InputError(f"{path}, line {lines[row]}: {times_of_rows}: expected increasing times")
+    is_third = measured[2:] == measured[:-2]
+    if is_third.any():
+        row = is_third.argmax()
+        rows = f"lines {lines[row]} to {lines[row + 2]}: three rows at {measured[row]:g} s"
+        raise InputError(f"{path}, {rows}: expected at most two, which are a jump; export more digits")
+    times = _less(measured, start)
+    values = _less(columns_read[control], offset) * scale
     notes = [f"{start:g} s in the file is time zero"] if start else []
-    largest, lowest = float(np.max(np.abs(values))), float(values.min())
+    largest = float(np.max(np.abs(values)))
+    lowest = float(values.min())
     if control in LEAST and lowest < 0:
         highest = max(float(values.max()), 0.0)
         if lowest < -_NOISE * highest:
@@ -154,17 +176,23 @@ def thinned(times: Array, values: Array, tolerance: float) -> NDArray[np.intp]:
     """
     if tolerance <= 0:
         return np.arange(len(times))
-    at, of, kept = times.tolist(), values.tolist(), [0]
-    while kept[-1] < len(at) - 1:
+    time = times.tolist()
+    value = values.tolist()
+    kept = [0]
+    while kept[-1] < len(time) - 1:
         start = kept[-1]
-        low, high, farthest = -math.inf, math.inf, start + 1
-        for row in range(start + 1, len(at)):
-            if at[row] == at[row - 1]:  # a jump: the line ends before it
+        low = -math.inf
+        high = math.inf
+        farthest = start + 1
+        for row in range(start + 1, len(time)):
+            if time[row] == time[row - 1]:  # a jump: the line ends before it
                 break
-            span, rise = at[row] - at[start], of[row] - of[start]
+            span = time[row] - time[start]
+            rise = value[row] - value[start]
             if low <= rise / span <= high:
                 farthest = row
-            low, high = max(low, (rise - tolerance) / span), min(high, (rise + tolerance) / span)
+            low = max(low, (rise - tolerance) / span)
+            high = min(high, (rise + tolerance) / span)
             if low > high:
                 break
         kept.append(farthest)

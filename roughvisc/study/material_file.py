@@ -27,8 +27,9 @@ COLUMNS: dict[str, dict[str, tuple[str, str]]] = {
 }
 for _columns in COLUMNS.values():
     _columns["temperature"] = ("temperatures", "K")
-#: Columns that are read only if their name is stated, and those that are read if the file has them.
-_IF_STATED, _IF_THERE = ("temperature", "tan_delta"), ("shift_factor",)
+#: Columns that are read only if their name is stated, and columns that are read if the file contains them.
+_IF_STATED = ("temperature", "tan_delta")
+_IF_THERE = ("shift_factor",)
 #: Keys of a table that describe its file.
 FILE = ("file", "columns", "part")
 
@@ -70,13 +71,20 @@ def read_material(
         If the file, a column or a unit is missing or ambiguous, or the function of the model refuses the rows; the
         message names the file and the line.
 
+    See Also
+    --------
+    roughvisc.creep_table, roughvisc.relaxation_table, roughvisc.dynamic_table
+
     Examples
     --------
+    >>> import tempfile
     >>> import roughvisc as rv
-    >>> names = {"frequency": "f [Hz]", "storage": "E'", "loss": "E''"}
-    >>> rubber = rv.read_material(  # doctest: +SKIP
-    ...     "dma.csv", "dynamic_table", columns=names, kind="tensile"
-    ... )
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     with open(f"{folder}/creep.csv", "w") as file:
+    ...         _ = file.write("time [s], J [1/MPa]\\n0.1, 1\\n1, 1.5\\n10, 2\\n")
+    ...     rubber = rv.read_material(f"{folder}/creep.csv", "creep_table", columns={"compliance": "J"}, kind="shear")
+    >>> bool(abs(rubber.creep_compliance(1.0) - 1.5e-6) < 1e-7)
+    True
     """
     one_of("model", model, COLUMNS)
     stated = {"model": model, "file": str(file), "columns": columns, "part": part, **arguments}
@@ -114,7 +122,7 @@ def with_columns(where: str, stated: Any) -> dict[str, Any]:
 
 
 def with_line(error: InputError, stated: Mapping[str, Any]) -> InputError:
-    """Return an error about the rows of a table with the file and the line in place of the table and its row."""
+    """Return an error about the rows of a table with the file and the line instead of the table and its row."""
     text = str(error)
     file = str(stated["file"])
     if matched := re.search(r"table row (\d+)", text):
@@ -134,9 +142,9 @@ def _export(description: Mapping[str, Any], table: Mapping[str, Any]) -> Export:
     for key, name in names.items():
         if not isinstance(name, str) or not name.strip():
             raise InputError(key=f"columns.{key}", found=name, expected="the name of a column in the file")
-    part = description.get("part")
-    if part is not None and (not isinstance(part, str) or not part.strip()):
-        raise InputError(key="part", found=part, expected="the text of a line above the names of a step")
+    step = description.get("part")
+    if step is not None and (not isinstance(step, str) or not step.strip()):
+        raise InputError(key="part", found=step, expected="the text of a line above the names of a step")
     if "tan_delta" in names and "loss" in names:
         raise InputError(key="columns.tan_delta", found=names["tan_delta"], expected="either tan_delta or loss")
     wanted = {}
@@ -150,17 +158,17 @@ def _export(description: Mapping[str, Any], table: Mapping[str, Any]) -> Export:
         named = wanted["frequency"]
         if "[" not in named.name and "(" not in named.name:
             wanted["frequency"] = named._replace(name=f"{named.name} [{stated_unit}]")
-    return read_export(description["file"], wanted, part)
+    return read_export(description["file"], wanted, step)
 
 
 def _arguments(model: str, table: Mapping[str, Any], export: Export) -> dict[str, Any]:
-    """Return a table with the columns of an export in place of its file."""
+    """Return a table with the columns of an export instead of its file."""
     columns = dict(export.columns)
     if "tan_delta" in columns:
         columns["loss"] = columns["storage"] * columns.pop("tan_delta")
-    found = {COLUMNS[model][key][0]: values.tolist() for key, values in columns.items()}
+    arguments = {COLUMNS[model][key][0]: values.tolist() for key, values in columns.items()}
     if "frequency" in export.units:
-        found["frequency_unit"] = export.units["frequency"]
+        arguments["frequency_unit"] = export.units["frequency"]
     if export.note:
-        found["note"] = export.note
-    return {**table, **found}
+        arguments["note"] = export.note
+    return {**table, **arguments}

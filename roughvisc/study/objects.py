@@ -58,17 +58,19 @@ def tables_of(
     tables: dict[str, Any] = {key: value for key, value in further.items() if value is not None}
     tables |= {"surface": table, "material": material_table(material, experiment, settings)}
     tables |= experiment_table(experiment)
-    for one in fields(Settings):
-        value = getattr(settings, one.name)
-        if one.name in TABLE_OF and value != one.default:
-            tables.setdefault(TABLE_OF[one.name], {})[one.name] = list(value) if isinstance(value, tuple) else value
+    for setting in fields(Settings):
+        value = getattr(settings, setting.name)
+        if setting.name in TABLE_OF and value != setting.default:
+            tables.setdefault(TABLE_OF[setting.name], {})[setting.name] = (
+                list(value) if isinstance(value, tuple) else value
+            )
     if settings.adhesion is not None:
         tables["adhesion"] = adhesion_table(settings.adhesion)
     if heights is not None and settings.boundary == "auto" and settings.edge != "accept":
-        found = experiment.boundary or boundary_of(heights)
-        if found is None:
+        boundary = experiment.boundary or boundary_of(heights)
+        if boundary is None:
             raise InputError(key="boundary", found="auto", expected=OPEN_BOUNDARY)
-        tables.setdefault("solve", {})["boundary"] = found
+        tables.setdefault("solve", {})["boundary"] = boundary
     return tables, heights
 
 
@@ -106,8 +108,8 @@ def material_table(material: Any, experiment: Experiment, settings: Settings) ->
     body = material if isinstance(material, Body) else Body(check_material(material))
     if isinstance(body, LayeredBody):
         table = _of_material(body.materials[-1])
-        for one, thickness in zip(body.materials[-2::-1], body.thicknesses[::-1], strict=True):
-            table = _of_material(one) | {"thickness": thickness, "on": table}
+        for upper, thickness in zip(body.materials[-2::-1], body.thicknesses[::-1], strict=True):
+            table = _of_material(upper) | {"thickness": thickness, "on": table}
     else:
         if isinstance(body.material, Creep) and not _is_stated(body.material):
             body = Body(_series_of(body.material, experiment, settings), body.kernel)
@@ -141,17 +143,17 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Prony | Creep):
         return _of_material(value)
     if isinstance(value, Mapping):
-        return {name: _plain(one) for name, one in value.items()}
+        return {name: _plain(inner) for name, inner in value.items()}
     if isinstance(value, list | tuple | np.ndarray):
-        return [_plain(one) for one in value]
+        return [_plain(inner) for inner in value]
     return value.item() if isinstance(value, np.generic) else value
 
 
 def _is_same(body: Body, other: Body) -> bool:
     """Return whether two bodies give the same numbers, including the errors of their fits."""
     return body == other and all(
-        (one.misfit, one.stands_for) == (two.misfit, two.stands_for)
-        for one, two in zip(body.materials, other.materials, strict=True)
+        (first.misfit, first.stands_for) == (two.misfit, two.stands_for)
+        for first, two in zip(body.materials, other.materials, strict=True)
     )
 
 
@@ -163,7 +165,7 @@ def _is_stated(material: Material) -> bool:
 
 
 def _series_of(material: Creep, experiment: Experiment, settings: Settings) -> Prony:
-    """Return the series that a run uses in place of a creep function of the user's."""
+    """Return the series that replaces a creep function of the user in a run."""
     if material.function is pair_creep or not isinstance(experiment, Loading):
         expected = "materials without a function of your own, in a pair and in steady sliding; rv.simulate takes them"
         raise InputError(key="material", found=material, expected=expected)
@@ -197,22 +199,24 @@ def experiment_of(program: Any) -> Experiment:
 def experiment_table(experiment: Experiment) -> dict[str, Any]:
     """Return the table ``friction`` of steady sliding, or the tables ``program``."""
     if isinstance(experiment, SteadySliding):
-        stated = {one.name: getattr(experiment, one.name) for one in fields(experiment)}
+        stated = {argument.name: getattr(experiment, argument.name) for argument in fields(experiment)}
         stated["speeds"] = list(stated["speeds"])
         return {"friction": {name: value for name, value in stated.items() if value is not None}}
     assert isinstance(experiment, Loading)
     segments = list(experiment.program.segments)
     tables: list[dict[str, Any]] = []
     while segments:
-        one = segments.pop(0)
+        segment = segments.pop(0)
         if segments and segments[0].amplitude:  # a jump to the mean, and the wave
             tables.append(_of_cycle(segments.pop(0)))
-        elif one.slide is not None:
-            tables.append({"slide": one.slide.distance, "over": one.duration, "direction": one.slide.direction})
-        elif one.end is None:
-            tables.append({"hold": one.duration, "control": one.control})
+        elif segment.slide is not None:
+            tables.append(
+                {"slide": segment.slide.distance, "over": segment.duration, "direction": segment.slide.direction}
+            )
+        elif segment.end is None:
+            tables.append({"hold": segment.duration, "control": segment.control})
         else:
-            tables.append({one.control: one.end, "over": one.duration})
+            tables.append({segment.control: segment.end, "over": segment.duration})
     if program_of(tables, can_pull=True) != experiment.program:
         expected = "segments that the methods of rv.Program make"
         raise InputError(key="program", found=experiment.program, expected=expected)
@@ -228,6 +232,6 @@ def _of_cycle(wave: Segment) -> dict[str, Any]:
         for _ in range(_ROUNDINGS):
             step = math.nextafter(step, direction)
             near.append(step)
-    exact = [one for one in [float(round(count)), *near] if one * wave.period == wave.duration]
+    exact = [cycles for cycles in [float(round(count)), *near] if cycles * wave.period == wave.duration]
     cycle = {"mean": wave.end, "amplitude": wave.amplitude, "period": wave.period, "cycles": (exact or near)[0]}
     return {"cycle": cycle, "control": wave.control}

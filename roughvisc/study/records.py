@@ -40,11 +40,14 @@ _EXPORTS: tuple[tuple[re.Pattern[str], dict[str, str]], ...] = (
 )
 #: Part of the largest force or depth from which on a row is at the end of the approach, part of the largest force at
 #: which depths begin, and shortest hold over the approach.
-_REACHED, _TOUCHED, _HELD = 0.98, 0.05, 0.1
+_REACHED = 0.98
+_TOUCHED = 0.05
+_HELD = 0.1
 #: Smallest fall of the depth, over its largest value, that begins the retraction.
 _FALL = 0.005
 #: Largest number of rows of a fit; more are averaged. Smallest number of rows in contact.
-_MOST_ROWS, _LEAST_ROWS = 600, 20
+_MOST_ROWS = 600
+_LEAST_ROWS = 20
 #: Largest half-width of an interval of 90 %, over the modulus: beyond it the modulus is not determined.
 _WIDEST = 0.5
 #: Largest noise of the depth, over its rise: with 3e-4 and 1e-3, intervals of 90 % cover 86 and 20 %.
@@ -68,7 +71,7 @@ def read_record(
     Parameters
     ----------
     path : path
-        A text export of JPK or Optics11, which need no other argument, or a table with a heading; see Notes.
+        A text export of JPK or Optics11, without any other argument, or a table with a heading; see Notes.
     time, force : str
         Names of the columns of time and force, compression positive.
     approach : str, optional
@@ -91,6 +94,10 @@ def read_record(
     InputError
         If the file or a column cannot be read, times do not increase, the stiffness is absent, or no force is positive.
 
+    See Also
+    --------
+    roughvisc.fit_material, roughvisc.read_program
+
     Notes
     -----
     The approach ends where the force or the depth reaches 98 % of its largest value. The retraction begins where the
@@ -101,8 +108,14 @@ def read_record(
 
     Examples
     --------
-    >>> record = rv.read_record("curve.txt")  # doctest: +SKIP
-    >>> record["force"] = record.force - record.force[:500].median()  # doctest: +SKIP
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     with open(f"{folder}/curve.csv", "w") as file:
+    ...         _ = file.write("time [s], force [uN], approach [um]\\n0, 0, 0\\n1, 1, 1\\n2, 3, 2\\n3, 1, 1\\n")
+    ...     record = rv.read_record(f"{folder}/curve.csv")
+    >>> record.force.max().item()
+    3e-06
     """
     path = path_of(path, "path")
     try:
@@ -120,10 +133,11 @@ def read_record(
         names |= {"height": height} if approach is None else {"approach": approach}
     units = {"time": "s", "force": "N"}
     columns, lines = read_table(path, {key: Wanted(name, units.get(key, "m")) for key, name in names.items()})
-    for row in np.flatnonzero(np.diff(columns["time"]) < 0)[:1] + 1:
-        raise InputError(
-            key=f"{path}, line {lines[row]}: time", found=columns["time"][row], expected="increasing times"
-        )
+    falls = np.diff(columns["time"]) < 0
+    if falls.any():
+        row = falls.argmax() + 1
+        key = f"{path}, line {lines[row]}: time"
+        raise InputError(key=key, found=columns["time"][row], expected="increasing times")
     if columns["force"].max() <= 0:
         highest = float(columns["force"].max())
         raise InputError(key="force", found=highest, expected="a positive force, compression positive")
@@ -258,6 +272,10 @@ def fit_material(
         with a noise of more than 5e-4 of the largest one (of the mean of rows beyond 600); if it does not determine the
         modulus at any time, or a requested time of a term.
 
+    See Also
+    --------
+    roughvisc.read_record, roughvisc.closed_forms.lee_radok
+
     Notes
     -----
     While the contact grows, with :math:`k = 8 \sqrt R / 3 (1 - \nu)` and :math:`n = 3/2` for a sphere of radius
@@ -277,9 +295,18 @@ def fit_material(
 
     Examples
     --------
-    >>> bead = rv.sphere("10 um", "12 um", 64)  # doctest: +SKIP
-    >>> fit = rv.fit_material(rv.read_record("curve.txt"), bead)  # doctest: +SKIP
-    >>> ds = rv.simulate(bead, fit.material, fit.program(record), boundary="free")  # doctest: +SKIP
+    >>> import numpy as np
+    >>> import roughvisc as rv
+    >>> import xarray as xr
+    >>> time = np.linspace(0.0, 2.0, 201)
+    >>> depth = 1e-6 * np.minimum(time, 1.0)
+    >>> force = 16 / 3 * 1e3 * 1e-5**0.5 * depth**1.5  # Hertz, for a shear modulus of 1 kPa
+    >>> segment = np.where(time < 1.0, "approach", "hold")
+    >>> rows = {"force": ("time", force), "approach": ("time", depth), "segment": ("time", segment)}
+    >>> record = xr.Dataset(rows, {"time": time}).set_coords("segment")
+    >>> fit = rv.fit_material(record, rv.sphere("10 um", "12 um", 16), contact_point=0.0)
+    >>> round(1 / float(fit.material.creep_compliance(0.0)), 3)
+    1000.0
     """
     check_poisson(poisson)
     one_of("kind", kind, ("auto", "relaxation", "creep"))
@@ -296,11 +323,12 @@ def fit_material(
         expected = "a record that determines the modulus to half of itself: less noise, or a longer hold"
         raise InputError(key="record", found="wider intervals at all times", expected=expected)
     times = rows.terms() if terms is None else listed(terms, "s", "terms")
-    shortest, longest = known.time[is_known][0], 3 * known.time[is_known][-1]
-    for i, one in enumerate(() if terms is None else times):
-        if not shortest <= one <= longest:
+    shortest = known.time[is_known][0]
+    longest = 3 * known.time[is_known][-1]
+    for i, time in enumerate(() if terms is None else times):
+        if not shortest <= time <= longest:
             expected = f"a relaxation time that the record determines, from {shortest:.3g} to {longest:.3g} s"
-            raise InputError(key=f"terms.{i}", found=float(one), expected=expected)
+            raise InputError(key=f"terms.{i}", found=float(time), expected=expected)
     columns, target = (
         (rows.creep_columns(times), rows.power(contact)) if is_creep else (rows.columns(contact, times), rows.force)
     )
@@ -362,14 +390,15 @@ def _rows(record: xr.Dataset, factor: float, exponent: float) -> tuple[Indentati
             key="record", found=f"depths with a noise of {noise:.2g} of the largest depth", expected=expected
         )
     is_held = loading["segment"].values == "hold"
-    held = [np.ptp(column[is_held]) / np.ptp(column) if is_held.any() else 1.0 for column in columns[1:]]
-    return rows, bool(held[0] < held[1])
+    share_in_hold = [np.ptp(column[is_held]) / np.ptp(column) if is_held.any() else 1.0 for column in columns[1:]]
+    return rows, bool(share_in_hold[0] < share_in_hold[1])
 
 
 def _found_contact(rows: Indentation) -> float:
     """Return the contact point; refuse a record that does not show it."""
     above = int(np.argmax(rows.force > _SEARCHED * rows.force.max()))
-    low, high = float(rows.depth.min()), float(rows.depth[above])
+    low = float(rows.depth.min())
+    high = float(rows.depth[above])
     contact = contact_point(rows, low, high) if high > low else low
     if contact <= low + 1e-3 * (high - low):
         expected = "a record that begins before the contact, with an offset of the force subtracted, or contact_point"

@@ -138,8 +138,8 @@ def in_si(value: Any, key: str, tables: Mapping[str, Any], folder: Path | None =
         return str(path)
     if isinstance(value, Mapping | list | tuple):
         parts = dict(value if isinstance(value, Mapping) else enumerate(value))
-        for name, part in parts.items():
-            parts[name] = in_si(part, f"{key}.{name}" if key else name, tables, folder)
+        for name, inner in parts.items():
+            parts[name] = in_si(inner, f"{key}.{name}" if key else name, tables, folder)
         return parts if isinstance(value, Mapping) else list(parts.values())
     if isinstance(value, bool) or value is None:
         return value
@@ -272,7 +272,7 @@ def speeds_of(where: str, stated: Any) -> list[float]:
     """Return speeds in increasing order, from one speed, a list, or ``from``, ``to`` and ``count``. [m/s]"""
     if not isinstance(stated, Mapping):
         listed = stated if isinstance(stated, list) else [stated]
-        return sorted({number(one, "m/s", where) for one in listed})
+        return sorted({number(stated_speed, "m/s", where) for stated_speed in listed})
     refuse_unknown(where, stated, ("from", "to", "count"))
     first, last = (number(stated.get(key), "m/s", f"{where}.{key}", above=0) for key in ("from", "to"))
     count: Any = stated.get("count")
@@ -339,7 +339,7 @@ def material_of(table: Mapping[str, Any], where: str = "material") -> Material:
     scaling, own = split(own, "model", "modulus_factor")
     if model == "pair":
         parts = split(own, "a", "b")[0]
-        own |= {key: material_of(a_table(f"{where}.{key}", one), f"{where}.{key}") for key, one in parts.items()}
+        own |= {key: material_of(a_table(f"{where}.{key}", inner), f"{where}.{key}") for key, inner in parts.items()}
     material = call(MODELS[model], where, own)
     factor = shift_factor(stated, where)
     if "temperature" in stated:
@@ -410,7 +410,8 @@ def check_loads(where: str, stated: Any, program: Program, can_pull: bool) -> No
         return
     if isinstance(stated, list):
         row = next(row for row, value in enumerate(stated) if value < 0)
-        where, stated = f"{where}.{row}", stated[row]
+        where = f"{where}.{row}"
+        stated = stated[row]
     raise InputError(key=where, found=stated, expected="a load or pressure of at least 0, or a table [adhesion]")
 
 
@@ -437,7 +438,8 @@ def settings_of(tables: Mapping[str, Any], experiment: Experiment, body: Body) -
         raise InputError(key="solve.boundary", found="auto", expected=OPEN_BOUNDARY)
     settings = replace(settings, boundary=boundary)
     if isinstance(experiment, Loading) and isinstance(settings.times, tuple):
-        end, last = experiment.program.duration, max(settings.times, default=0.0)
+        end = experiment.program.duration
+        last = max(settings.times, default=0.0)
         if last > end * (1 + _ROUNDING):
             raise InputError(key="keep.times", found=last, expected=f"times up to the end of the program, {end:g} s")
     for name, value, expected in experiment.unsupported(settings, body):

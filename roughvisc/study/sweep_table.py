@@ -21,13 +21,15 @@ from roughvisc.errors import InputError, short_repr
 Array = NDArray[np.float64]
 
 #: Keys of the number of realisations in a sweep, and of the number of a realisation in a case.
-REALISATIONS, REALISATION = "realisations", "realisation"
+REALISATIONS = "realisations"
+REALISATION = "realisation"
 #: Number of the measured surface, which comes before its surrogates.
 ITSELF = 0
 #: Keys that a realisation changes.
 SURROGATE, _SEED = DRAWN = ("surface.realisation", "surface.seed")
 #: Largest numbers of realisations and of cases.
-MOST, MOST_CASES = 10_000, 100_000
+MOST = 10_000
+MOST_CASES = 100_000
 
 
 def sweep_changes(sweep: Any, data: Mapping[str, Any], folder: Path) -> list[tuple[dict[str, Any], dict[str, int]]]:
@@ -53,17 +55,17 @@ def sweep_changes(sweep: Any, data: Mapping[str, Any], folder: Path) -> list[tup
         If the tables are not lists of values, a pattern matches no file, there are too many cases, a key does not
         influence results, or the surface has no realisations.
     """
-    found: list[tuple[dict[str, Any], dict[str, int]]] = []
+    cases: list[tuple[dict[str, Any], dict[str, int]]] = []
     for change in expand(sweep, folder):
         for key in change:
             if key.partition(".")[0] in ("observe", "audit"):
                 expected = "a value in its own table, since it changes no result"
                 raise InputError(key=key, found=change[key], expected=expected)
         count = change.pop(REALISATIONS, None)
-        found += [(change, {})] if count is None else _realisations(change, count, data)
-        if len(found) > MOST_CASES:
-            raise InputError(key="sweep", found=f"{len(found)} cases", expected=f"at most {MOST_CASES}")
-    return found
+        cases += [(change, {})] if count is None else _realisations(change, count, data)
+        if len(cases) > MOST_CASES:
+            raise InputError(key="sweep", found=f"{len(cases)} cases", expected=f"at most {MOST_CASES}")
+    return cases
 
 
 def expand(sweep: Any, folder: Path = Path()) -> list[dict[str, Any]]:
@@ -82,7 +84,7 @@ def expand(sweep: Any, folder: Path = Path()) -> list[dict[str, Any]]:
     tables = sweep if isinstance(sweep, list) else [sweep]
     if not tables or not all(isinstance(table, Mapping) for table in tables):
         raise InputError(key="sweep", found=sweep, expected="a table of lists, or [[sweep]] tables")
-    found: list[dict[str, Any]] = []
+    changes: list[dict[str, Any]] = []
     for number, table in enumerate(tables):
         lists = {key: _matching(key, value, folder) for key, value in _flat(table)}
         if tables is sweep:
@@ -100,8 +102,8 @@ def expand(sweep: Any, folder: Path = Path()) -> list[dict[str, Any]]:
             if (count := math.prod(map(len, lists.values()))) > MOST_CASES:
                 raise InputError(key="sweep", found=f"{count} cases", expected=f"at most {MOST_CASES}")
             chosen = itertools.product(*lists.values())
-        found += [dict(zip(lists, values, strict=True)) for values in chosen]
-    return found
+        changes += [dict(zip(lists, values, strict=True)) for values in chosen]
+    return changes
 
 
 def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
@@ -120,18 +122,18 @@ def _matching(key: str, value: Any, folder: Path) -> Any:
     """
     if key.rpartition(".")[2] != "file":
         return value
-    found: list[Any] = []
-    for one in value if isinstance(value, list) else [value]:
-        if not isinstance(one, str) or not set("*?[") & set(one) or (folder / one).exists():
-            found.append(one)
+    values: list[Any] = []
+    for pattern in value if isinstance(value, list) else [value]:
+        if not isinstance(pattern, str) or not set("*?[") & set(pattern) or (folder / pattern).exists():
+            values.append(pattern)
             continue
-        names = glob(os.path.expanduser(one), root_dir=folder, recursive=True)
+        names = glob(os.path.expanduser(pattern), root_dir=folder, recursive=True)
         matches = sorted(name for name in names if (folder / name).is_file())
         if not matches:
             expected = f"a pattern that matches a file in {folder.absolute()}"
-            raise InputError(key=f"sweep.{key}", found=one, expected=expected)
-        found += matches
-    return value if found == [value] else found
+            raise InputError(key=f"sweep.{key}", found=pattern, expected=expected)
+        values += matches
+    return value if values == [value] else values
 
 
 def _realisations(
@@ -152,8 +154,11 @@ def _realisations(
         raise InputError(key=where, found=count, expected=f"either realisations or {stated[0]}")
     if "file" in surface or "file" in a_table("surface.second", surface.get("second", {})):
         surrogates = [{SURROGATE: number} for number in range(ITSELF + 1, count + 1)]
-        return [(change | one, {REALISATION: number}) for number, one in enumerate([{}, *surrogates], ITSELF)]
-    made, seed = surface.get("generate"), surface.get("seed")
+        return [
+            (change | surrogate, {REALISATION: number}) for number, surrogate in enumerate([{}, *surrogates], ITSELF)
+        ]
+    made = surface.get("generate")
+    seed = surface.get("seed")
     if made not in ("self_affine", "spectrum") or "second" in surface:
         expected = "a scan, or one face of 'self_affine' or 'spectrum'"
         raise InputError(key=where, found=f"generate = {made!r}", expected=expected)
@@ -194,22 +199,23 @@ def place(tables: Any, key: str, value: Any, above: str = "") -> Any:
 
     if isinstance(tables, Mapping):
         entries = {**tables, part: changed(tables.get(part, {}))}
-        return {name: one for name, one in entries.items() if one is not None}
+        return {name: entry for name, entry in entries.items() if entry is not None}
     if isinstance(tables, list) and part.isdecimal() and int(part) < len(tables):
-        at = int(part)
-        return [*tables[:at], changed(tables[at]), *tables[at + 1 :]]
-    whole, expected = dotted(above, key), f"an entry or a key of {above}"
+        index = int(part)
+        return [*tables[:index], changed(tables[index]), *tables[index + 1 :]]
+    whole = dotted(above, key)
+    expected = f"an entry or a key of {above}"
     message = f"{whole}: {above} is {short_repr(tables)}, which has no {part!r}: expected {expected}"
     raise InputError(message, key=whole, found=value, expected=expected)
 
 
 def value_at(tables: Any, key: str, default: Any) -> Any:
     """Return the value at a dotted key of nested tables."""
-    for part in key.split("."):
-        if isinstance(tables, list) and part.isdecimal() and int(part) < len(tables):
-            tables = tables[int(part)]
-        elif isinstance(tables, Mapping) and part in tables:
-            tables = tables[part]
+    for name in key.split("."):
+        if isinstance(tables, list) and name.isdecimal() and int(name) < len(tables):
+            tables = tables[int(name)]
+        elif isinstance(tables, Mapping) and name in tables:
+            tables = tables[name]
         else:
             return default
     return tables
@@ -239,6 +245,10 @@ def over_realisations(values: xr.DataArray) -> xr.Dataset:
     ------
     InputError
         If the quantity has no dimension ``realisation``.
+
+    See Also
+    --------
+    roughvisc.sweep, roughvisc.surrogates
 
     Notes
     -----
@@ -270,18 +280,19 @@ def over_realisations(values: xr.DataArray) -> xr.Dataset:
         raise InputError(key=str(values.name or "values"), found=list(values.dims), expected=expected)
     values = values.transpose(REALISATION, ...)
     numbers = values[REALISATION].values if REALISATION in values.coords else np.ones(len(values))
-    found = statistics(values.values[numbers != ITSELF])
+    columns = statistics(values.values[numbers != ITSELF])
     if ITSELF in numbers:
-        itself = found["itself"] = values.values[numbers == ITSELF][0]
-        mean = found["mean"]
-        found["ratio"] = np.divide(itself, mean, out=np.full_like(mean, np.nan), where=mean != 0)
-    units, name = values.attrs.get("units", "1"), str(values.attrs.get("long_name", values.name or "values"))
+        itself = columns["itself"] = values.values[numbers == ITSELF][0]
+        mean = columns["mean"]
+        columns["ratio"] = np.divide(itself, mean, out=np.full_like(mean, np.nan), where=mean != 0)
+    units = values.attrs.get("units", "1")
+    name = str(values.attrs.get("long_name", values.name or "values"))
     variables = {}
-    for one, array in found.items():
-        unit = "1" if one in ("count", "ratio") else units
-        attributes = {"long_name": f"{one.replace('_', ' ')}: {name}", "units": unit}
-        variables[one] = (values.dims[1:], array, attributes)
-    coords = {key: one for key, one in values.coords.items() if REALISATION not in one.dims}
+    for statistic, array in columns.items():
+        unit = "1" if statistic in ("count", "ratio") else units
+        attributes = {"long_name": f"{statistic.replace('_', ' ')}: {name}", "units": unit}
+        variables[statistic] = (values.dims[1:], array, attributes)
+    coords = {key: coordinate for key, coordinate in values.coords.items() if REALISATION not in coordinate.dims}
     return xr.Dataset(variables, coords, {"quantity": str(values.name or "")})
 
 
@@ -298,16 +309,18 @@ def statistics(values: Array) -> dict[str, Array]:
         middle = np.nansum(logarithms, axis=0) / count
         spread = np.sqrt(np.nansum((logarithms - middle) ** 2, axis=0) / freedom)
         of_mean = student * np.sqrt(spread**2 / count + spread**4 / (2 * freedom))
-        of_patch, centre = student * np.sqrt(1 + 1 / count), middle + spread**2 / 2
+        of_patch = student * np.sqrt(1 + 1 / count)
+        centre = middle + spread**2 / 2
         least = np.fmin.reduce(values, axis=0, initial=np.inf)
         # in logarithms if all values are positive; no interval if some are zero and none is negative
-        positive, zero = least > 0, least == 0
+        positive = least > 0
+        zero = least == 0
         ends = {
             "lower": (np.exp(centre - of_mean), mean - student / np.sqrt(count) * deviation),
             "upper": (np.exp(centre + of_mean), mean + student / np.sqrt(count) * deviation),
             "patch_lower": (np.exp(middle - of_patch * spread), mean - of_patch * deviation),
             "patch_upper": (np.exp(middle + of_patch * spread), mean + of_patch * deviation),
         }
-    found = {"mean": mean, "standard_deviation": deviation}
-    found |= {name: np.where(zero, np.nan, np.where(positive, *pair)) for name, pair in ends.items()}
-    return found | {"count": count}
+    columns = {"mean": mean, "standard_deviation": deviation}
+    columns |= {name: np.where(zero, np.nan, np.where(positive, *pair)) for name, pair in ends.items()}
+    return columns | {"count": count}

@@ -16,6 +16,10 @@ def example_scan() -> Path:
         An X3P file, 160 x 256 points over 70 um x 112 um, measured by focus variation and not levelled. Do not change
         it; ``roughvisc new`` writes a copy into the current folder.
 
+    See Also
+    --------
+    roughvisc.open_scan, roughvisc.inspect
+
     Examples
     --------
     >>> import roughvisc as rv

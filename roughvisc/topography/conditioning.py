@@ -20,7 +20,7 @@ from roughvisc.topography.recipes import surrogate
 from roughvisc.topography.spectrum import resample, without_short_waves
 
 
-class Step(NamedTuple):
+class ConditioningStep(NamedTuple):
     """Conditioning step.
 
     Attributes
@@ -37,17 +37,17 @@ class Step(NamedTuple):
 
 #: Conditioning steps in the order in which they are applied. A value is true (the function with its defaults), false
 #: (the step is skipped), the value of one argument, or a table of arguments.
-STEPS: dict[str, Step] = {
-    "crop": Step(crop),
-    "rotate90": Step(rotate90, "turns"),
-    "invert": Step(invert),
-    "level": Step(level, "order"),
-    "outliers": Step(mask_outliers),
-    "fill": Step(fill),
-    "filter": Step(gaussian_filter, "cutoff"),
-    "shortest_wave": Step(without_short_waves, "shortest"),
-    "realisation": Step(surrogate, "number"),
-    "resample": Step(resample, "shape"),
+STEPS: dict[str, ConditioningStep] = {
+    "crop": ConditioningStep(crop),
+    "rotate90": ConditioningStep(rotate90, "turns"),
+    "invert": ConditioningStep(invert),
+    "level": ConditioningStep(level, "order"),
+    "outliers": ConditioningStep(mask_outliers),
+    "fill": ConditioningStep(fill),
+    "filter": ConditioningStep(gaussian_filter, "cutoff"),
+    "shortest_wave": ConditioningStep(without_short_waves, "shortest"),
+    "realisation": ConditioningStep(surrogate, "number"),
+    "resample": ConditioningStep(resample, "shape"),
 }
 #: Steps allowed for each face before two faces are combined.
 FACE_STEPS = ("crop", "rotate90", "invert", "level", "outliers", "fill", "filter")

@@ -58,7 +58,8 @@ def from_topography(topography: Any) -> xr.DataArray:
 
 
 def _of_surface_topography(topography: Any) -> xr.DataArray:
-    sizes, unit = topography.physical_sizes, topography.unit
+    sizes = topography.physical_sizes
+    unit = topography.unit
     if topography.dim != 2 or not topography.is_uniform or sizes is None:
         raise InputError(key="topography", found=topography, expected="a uniform map with its size")
     if unit is None:
@@ -90,7 +91,7 @@ def to_topography(height: xr.DataArray, unit: str = "m") -> Any:
     Returns
     -------
     SurfaceTopography.Topography
-        The same heights, masked where they are missing, periodic if :func:`roughvisc.simulate` takes the boundary
+        The same heights, masked at missing points, periodic if :func:`roughvisc.simulate` takes the boundary
         ``auto`` as periodic.
 
     Raises

@@ -41,6 +41,17 @@ def level(h: xr.DataArray, order: int = 1) -> xr.DataArray:
     ------
     InputError
         If the order is not one of these, or the points present do not determine the polynomial.
+
+    See Also
+    --------
+    roughvisc.inspect, roughvisc.gaussian_filter
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> tilted = rv.from_array([[0.0, 1e-6], [2e-6, 3e-6], [4e-6, 5e-6]], spacing="1 um")
+    >>> bool(abs(rv.level(tilted)).max() < 1e-15)
+    True
     """
     order = int(one_of("order", order, range(4)))
     h = checked(h, "level")
@@ -66,7 +77,8 @@ def less_polynomial(heights: np.ndarray, order: int) -> np.ndarray:
     i, j = np.indices((order + 1, order + 1)).reshape(2, -1)
     # heights do not vary across a strip
     kept = (i + j <= order) & ((i == 0) | (heights.shape[0] > 1)) & ((j == 0) | (heights.shape[1] > 1))
-    i, j = i[kept], j[kept]
+    i = i[kept]
+    j = j[kept]
     products = [(base[:, :, None] * base[:, None, :]).reshape(len(base), -1) for base in bases]
     moments = np.reshape(products[0].T @ present.astype(float) @ products[1], [order + 1] * 4)
     normal = moments[i[:, None], i, j[:, None], j]
@@ -111,11 +123,24 @@ def mask_outliers(h: xr.DataArray, window: int = 9, threshold: float = 8.0) -> x
     InputError
         If `window` is not an odd number of at least 3, or `threshold` is not positive.
 
+    See Also
+    --------
+    roughvisc.fill, roughvisc.inspect
+
     Notes
     -----
     Instruments fail at steep flanks and often have spikes next to missing points. Mask these before :func:`fill`, which
     would otherwise use the spikes as the rim of the hole. Isolated points inside a large hole are outliers at any
     height, see :func:`isolated`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import roughvisc as rv
+    >>> heights = np.random.default_rng(1).normal(0.0, 1e-9, (15, 15))
+    >>> heights[7, 7] = 1e-6
+    >>> rv.mask_outliers(rv.from_array(heights, spacing="1 um")).attrs["outliers"]
+    1
     """
     if not isinstance(window, int) or window < 3 or window % 2 == 0:
         raise InputError(key="window", found=window, expected="an odd whole number of at least 3")
@@ -180,6 +205,20 @@ def fill(h: xr.DataArray) -> xr.DataArray:
     ------
     InputError
         If all points are missing, or they are absent on purpose (no material there).
+
+    See Also
+    --------
+    roughvisc.mask_outliers, roughvisc.level
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import roughvisc as rv
+    >>> heights = np.ones((5, 5))
+    >>> heights[2, 2] = np.nan
+    >>> filled = rv.fill(rv.from_array(1e-6 * heights, spacing="1 um"))
+    >>> round(float(filled[2, 2]), 9), filled.attrs["filled_points"]
+    (1e-06, 1)
     """
     h = checked(h, "fill")
     if h.attrs.get("missing") == "absent":
@@ -214,6 +253,10 @@ def gaussian_filter(h: xr.DataArray, cutoff: Quantity, keep: Literal["long", "sh
     InputError
         If the cut-off is less than three cells or longer than the surface, or `keep` is unknown.
 
+    See Also
+    --------
+    roughvisc.without_short_waves, roughvisc.level, roughvisc.resample
+
     Notes
     -----
     The weight is :math:`\exp(-\pi (r / \alpha \lambda_c)^2)` with :math:`\alpha = \sqrt{\ln 2 / \pi}`, so the
@@ -223,6 +266,14 @@ def gaussian_filter(h: xr.DataArray, cutoff: Quantity, keep: Literal["long", "sh
     References
     ----------
     .. [1] ISO 16610-61:2015, Linear areal filters: Gaussian filters.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rough = rv.self_affine("1 mm", 64, hurst=0.8, rms_height="1 um", seed=1)
+    >>> smooth = rv.gaussian_filter(rough, cutoff="0.2 mm")
+    >>> bool(rv.parameters(smooth).Sdq < rv.parameters(rough).Sdq)
+    True
     """
     one_of("keep", keep, ("long", "short"))
     h = checked(h, "gaussian_filter")

@@ -42,6 +42,17 @@ def crop(
     ------
     InputError
         If limits are not a pair, or fewer than two cells lie within them along an axis.
+
+    See Also
+    --------
+    roughvisc.combine, roughvisc.resample
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> scan = rv.from_array([[0.0, 1e-6, 0.0], [0.0, 2e-6, 0.0], [0.0, 1e-6, 0.0]], spacing="1 um")
+    >>> rv.crop(scan, y=("1 um", "3 um")).shape
+    (3, 2)
     """
     chosen: dict[str, tuple[float, float]] = {}
     for axis, limits in (("x", x), ("y", y)):
@@ -51,16 +62,16 @@ def crop(
                 raise InputError(key=axis, found=limits, expected="a pair (low, high) [m], the lower limit first")
     h = checked(h, "crop")
     off = {axis: _ON_BORDER * side for axis, side in zip(("x", "y"), spacing(h), strict=True)}
-    part = h.sel({axis: slice(low - off[axis], high + off[axis]) for axis, (low, high) in chosen.items()})
+    cropped = h.sel({axis: slice(low - off[axis], high + off[axis]) for axis, (low, high) in chosen.items()})
     for axis, limits in chosen.items():
-        if part.sizes[axis] < 2:
+        if cropped.sizes[axis] < 2:
             first, last = (format_quantity(float(h[axis][end]), "m") for end in (0, -1))
             raise InputError(
                 key=axis, found=limits, expected=f"limits that hold at least two cells of {first} to {last}"
             )
-    nx, ny = part.shape
+    nx, ny = cropped.shape
     line = f"cropped to {nx} x {ny} cells: x {chosen.get('x', 'all')}, y {chosen.get('y', 'all')} m"
-    return noted(part, line, **({} if part.shape == h.shape else {"period": None}))
+    return noted(cropped, line, **({} if cropped.shape == h.shape else {"period": None}))
 
 
 def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
@@ -77,6 +88,22 @@ def rotate90(h: xr.DataArray, turns: int = 1) -> xr.DataArray:
     -------
     xarray.DataArray
         The rotated surface; coordinates start half a cell from zero. [m]
+
+    Raises
+    ------
+    InputError
+        If `turns` is not a whole number, or `h` is not a height grid.
+
+    See Also
+    --------
+    roughvisc.invert, roughvisc.crop
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> h = rv.from_array([[0.0, 1e-6, 2e-6], [3e-6, 4e-6, 5e-6]], spacing="1 um")
+    >>> rv.rotate90(h).shape
+    (3, 2)
     """
     if not isinstance(turns, int) or isinstance(turns, bool):
         raise InputError(key="turns", found=turns, expected="a whole number of quarter turns")
@@ -99,6 +126,22 @@ def invert(h: xr.DataArray) -> xr.DataArray:
     -------
     xarray.DataArray, dims (x, y)
         Heights with the opposite sign. [m]
+
+    Raises
+    ------
+    InputError
+        If `h` is not a height grid.
+
+    See Also
+    --------
+    roughvisc.rotate90, roughvisc.combine
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> replica = rv.from_array([[0.0, 1e-6], [0.0, 3e-6]], spacing="1 um")
+    >>> rv.invert(replica).min().item()
+    -3e-06
     """
     h = checked(h, "invert")
     return noted(like(h, -h.values), "inverted")
@@ -139,6 +182,10 @@ def combine(
     InputError
         If an argument has another value, or the second face covers fewer than two cells of the first along an axis.
 
+    See Also
+    --------
+    roughvisc.pair, roughvisc.invert, roughvisc.crop
+
     Notes
     -----
     The frictionless contact of two elastic or viscoelastic half-spaces is equivalent to the contact of one rigid
@@ -148,10 +195,18 @@ def combine(
     References
     ----------
     .. [1] K. L. Johnson, *Contact Mechanics*, CUP, 1985, section 4.1.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> wave = rv.wavy("1 um", "0.1 mm", "1 mm", 40, waves=1)
+    >>> bool(abs(rv.combine(wave, wave) - 2 * wave).max() < 1e-15)
+    True
     """
     one_of("flip", flip, (None, "x", "y"))
     apart = _two_lengths("offset", offset)
-    h1, h2 = checked(h1, "combine"), checked(h2, "combine")
+    h1 = checked(h1, "combine")
+    h2 = checked(h2, "combine")
     repeats = is_periodic(h1) and is_periodic(h2) and np.allclose(period_of(h1), period_of(h2), rtol=1e-6, atol=0)
     sha = h2.attrs.get("source_sha256")
     about = "; ".join(str(h2.attrs.get("history", "")).splitlines())
@@ -253,6 +308,22 @@ def mirror(h: xr.DataArray) -> xr.DataArray:
     -------
     xarray.DataArray, dims (x, y)
         Twice as many points along each axis. [m]
+
+    Raises
+    ------
+    InputError
+        If `h` is not a height grid.
+
+    See Also
+    --------
+    roughvisc.simulate, roughvisc.friction, roughvisc.resample
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rough = rv.from_array([[0.0, 1e-6], [0.0, 3e-6]], spacing="1 um")
+    >>> rv.mirror(rough).shape
+    (4, 4)
     """
     h = checked(h, "mirror")
     axes = [float(h[axis][0]) + np.arange(2 * h.sizes[axis]) * d for axis, d in zip("xy", spacing(h), strict=True)]

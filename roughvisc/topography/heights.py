@@ -1,10 +1,11 @@
-"""Heights from Python in a NetCDF file that is named by the digest of what a solve uses of them."""
+"""Heights from Python in a NetCDF file that is named by the digest of their values and attributes."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import re
+from contextlib import suppress
 from numbers import Number
 from pathlib import Path
 from typing import Any
@@ -16,12 +17,14 @@ from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
 from roughvisc.errors import InputError, RoughviscError
 from roughvisc.paths import atomic_write, opened
 from roughvisc.topography.borders import MIRRORED
-from roughvisc.topography.grid import checked
+from roughvisc.topography.grid import checked, nominal_area
 
 #: Name of the file of heights with a digest.
 _NAME = re.compile(r"heights-([0-9a-f]{16})\.nc")
 #: Key of the digest in the encoding of heights, which are not changed once it is known.
 _KNOWN = "digest"
+#: Nominal area of heights by their digest. [m2]
+_AREAS: dict[str, float] = {}
 #: Attributes of heights that influence a solve.
 _USED = ("recipe", "period", "missing", "filled_fraction")
 
@@ -71,7 +74,7 @@ def plain_heights(heights: Any) -> xr.DataArray:
         if isinstance(value, str | Number) and not isinstance(value, bool | complex):
             plain[name] = value
         elif isinstance(value, list | tuple | np.ndarray) and np.asarray(value).dtype.kind in "fiu":
-            plain[name] = [float(one) for one in np.ravel(value)]
+            plain[name] = [float(number) for number in np.ravel(value)]
     h.attrs = plain
     return h
 
@@ -84,6 +87,30 @@ def write_heights(h: xr.DataArray, folder: Path) -> Path:
         with atomic_write(path) as temporary:
             h.to_netcdf(temporary, engine="netcdf4", encoding={"height": packed})
     return path
+
+
+def area_in(path: Path, h: xr.DataArray | None = None) -> float | None:
+    """Return the nominal area of the heights of a file, from its coordinates; None without the file. [m2]
+
+    Parameters
+    ----------
+    path : Path
+        A file of heights, named by their digest.
+    h : xarray.DataArray, optional
+        The heights, which need not be in the file yet.
+    """
+    digest = digest_in(path.name)
+    if digest not in _AREAS:
+        if h is not None:
+            _AREAS[digest] = nominal_area(h)
+        else:
+            with (
+                suppress(OSError, RuntimeError, LookupError, ValueError, InputError),
+                NETCDF4_PYTHON_LOCK,
+                xr.open_dataset(path, engine="netcdf4", lock=False, decode_times=False) as dataset,
+            ):
+                _AREAS[digest] = nominal_area(dataset)
+    return _AREAS.get(digest)
 
 
 def read_heights(path: Path) -> xr.DataArray:

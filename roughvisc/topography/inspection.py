@@ -24,19 +24,25 @@ from roughvisc.units import unit_for
 _HOLES = 0.01
 #: Largest number of blocks along a side that are searched for a part without holes; least share of this part, and its
 #: fewest points along a side.
-_BLOCKS, _LEAST_PART, _FEWEST = 128, 0.1, 16
+_BLOCKS = 128
+_LEAST_PART = 0.1
+_FEWEST = 16
 #: Beyond this share of the points, spikes may be the surface itself.
 _MOST_SPIKES = 0.02
 #: Part of the plane in the rms height, and share of a quadratic form in its square, from which they are subtracted.
-_TILTED, _FORM = 0.01, 0.5
+_TILTED = 0.01
+_FORM = 0.5
 #: Root mean square slopes above and below which a unit or the spacing is probably wrong. [-]
-_STEEP, _FLAT = 1.0, 1e-4
+_STEEP = 1.0
+_FLAT = 1e-4
 #: A white tail of the spectrum falls no steeper than this power of the wavevector over the last octave. If the spectrum
 #: is below this multiple of the tail, noise is at least as strong as the surface.
-_WHITE, _ABOVE = -1.5, 2.0
+_WHITE = -1.5
+_ABOVE = 2.0
 #: A noise floor below this part of the rms height is rounding. Noise below this share of the mean square slope is not
 #: filtered.
-_ROUNDING, _HARMLESS = 1e-6, 0.02
+_ROUNDING = 1e-6
+_HARMLESS = 0.02
 #: Largest share of missing points for which noise is measured.
 _MOST_MISSING = 0.25
 #: Twice the missing points raise a true noise floor by a factor of at most 1.2, an artefact of interpolation by a
@@ -45,7 +51,7 @@ _OF_GAPS = 1.5
 
 
 @dataclass(frozen=True)
-class Finding:
+class Property:
     """One property of a scan.
 
     Attributes
@@ -72,7 +78,7 @@ class Inspection:
 
     Attributes
     ----------
-    findings : dict of str to Finding
+    findings : dict of str to Property
         By the names of the properties.
     steps : dict
         Conditioning steps of all findings, in order.
@@ -82,7 +88,7 @@ class Inspection:
         Of the surface after the steps. [m2, -]
     """
 
-    findings: dict[str, Finding]
+    findings: dict[str, Property]
     steps: dict[str, Any]
     boundary: Literal["periodic", "mirror"]
     area: float
@@ -122,30 +128,33 @@ def inspect(h: xr.DataArray) -> xr.Dataset:
     >>> found.finding.sel(property="Missing points").item()
     '0 (0 %)'
     """
-    found = inspection_of(h)
+    inspection = inspection_of(h)
     columns = {
-        "finding": [one.seen for one in found.findings.values()],
-        "advice": [one.advice for one in found.findings.values()],
-        "step": [json.dumps(one.step) if one.step else "" for one in found.findings.values()],
+        "finding": [finding.seen for finding in inspection.findings.values()],
+        "advice": [finding.advice for finding in inspection.findings.values()],
+        "step": [json.dumps(finding.step) if finding.step else "" for finding in inspection.findings.values()],
     }
     variables: dict[str, Any] = {name: ("property", values) for name, values in columns.items()}
-    variables["area"] = ((), found.area, {"units": "m^2", "long_name": "area after the steps"})
-    variables["rms_slope"] = ((), found.rms_slope, {"units": "1", "long_name": "rms slope after the steps"})
-    attributes = {"steps": json.dumps(found.steps), "boundary": found.boundary}
-    return xr.Dataset(variables, {"property": list(found.findings)}, attributes)
+    variables["area"] = ((), inspection.area, {"units": "m^2", "long_name": "area after the steps"})
+    variables["rms_slope"] = ((), inspection.rms_slope, {"units": "1", "long_name": "rms slope after the steps"})
+    attributes = {"steps": json.dumps(inspection.steps), "boundary": inspection.boundary}
+    return xr.Dataset(variables, {"property": list(inspection.findings)}, attributes)
 
 
 def inspection_of(h: xr.DataArray) -> Inspection:
     """Return the findings in a scan; see :func:`inspect`."""
     h = checked(h, "inspect")
-    findings: dict[str, Finding] = {}
-    missing, holes = int(h.isnull().sum()), in_large_holes(np.isnan(h.values))
-    seen, advices, step = f"{missing} ({_percent(missing / h.size)})", list[str](), dict[str, Any]()
+    findings: dict[str, Property] = {}
+    missing = int(h.isnull().sum())
+    holes = in_large_holes(np.isnan(h.values))
+    seen = f"{missing} ({_percent(missing / h.size)})"
+    advices = list[str]()
+    step = dict[str, Any]()
     has_holes = bool(holes.mean() > _HOLES)
-    if has_holes and (part := _clear_part(h, holes)):
-        h = crop(h, x=part.get("x"), y=part.get("y"))
-        step["crop"] = part
-        limits = [f"{axis} from {_length(low)} to {_length(high)}" for axis, (low, high) in part.items()]
+    if has_holes and (clear_part := _clear_part(h, holes)):
+        h = crop(h, x=clear_part.get("x"), y=clear_part.get("y"))
+        step["crop"] = clear_part
+        limits = [f"{axis} from {_length(low)} to {_length(high)}" for axis, (low, high) in clear_part.items()]
         advices.append(f"crop to the largest part without these holes, {' and '.join(limits)}")
     if gaps := int(h.isnull().sum()):
         step["fill"] = True
@@ -153,20 +162,21 @@ def inspection_of(h: xr.DataArray) -> Inspection:
     if has_holes:
         seen += f", {_percent(holes.mean())} of the scan in holes wider than a few points"
         advices.append('if there is no material in the holes, missing = "absent" instead')
-    findings["Missing points"] = Finding(seen, "; ".join(advices), step, {"points": missing})
+    findings["Missing points"] = Property(seen, "; ".join(advices), step, {"points": missing})
 
     levelled = level(h)
     masked = mask_outliers(levelled)
     spikes = int(masked.isnull().sum()) - gaps
     few = 0 < spikes <= _MOST_SPIKES * h.size
     kept = masked if few else levelled
-    rms_levelled, rms = (float(np.nanstd(one.values)) for one in (levelled, level(kept)))
-    seen, advice = f"{spikes} ({_percent(spikes / h.size)})", "too many to be spikes: check the picture" * (spikes > 0)
+    rms_levelled, rms = (float(np.nanstd(surface.values)) for surface in (levelled, level(kept)))
+    seen = f"{spikes} ({_percent(spikes / h.size)})"
+    advice = "too many to be spikes: check the picture" * (spikes > 0)
     if few:
         seen += f": Sq is {_length(rms_levelled)} with and {_length(rms)} without them"
         advice = "outliers = true; otherwise the spikes carry the load"
     step = {"outliers": True, "fill": True} if few else {}
-    findings["Spikes"] = Finding(seen, advice, step, {"points": spikes, "rms_with": rms_levelled, "rms_without": rms})
+    findings["Spikes"] = Property(seen, advice, step, {"points": spikes, "rms_with": rms_levelled, "rms_without": rms})
 
     plane = h - levelled
     slopes = tuple(float(np.nanmean(plane.diff(axis))) / d for axis, d in zip("xy", spacing(h), strict=True))
@@ -175,27 +185,27 @@ def inspection_of(h: xr.DataArray) -> Inspection:
     repeats = max(border_mismatch(kept)) > JUMP >= max(border_mismatch(h))  # a plane would break the periodicity
     order = 2 if form > _FORM else int(not repeats and np.nanstd(plane.values) > _TILTED * rms)
     treated = (level(h, order) if order else h).where(kept.notnull())
-    along_x, along_y = (f"{math.degrees(math.atan(abs(one))):.2g}°" for one in slopes)
+    along_x, along_y = (f"{math.degrees(math.atan(abs(slope))):.2g}°" for slope in slopes)
     seen = f"{along_x} along x, {along_y} along y; a quadratic form accounts for {_percent(form)} of Sq squared"
     with_form = 'level = 2 for the roughness alone; level = 1 and boundary = "free" for contact with the form'
     advice = ("", "level = 1 subtracts the plane", with_form)[order]
     values = {"slopes": slopes, "share": form, "rms_without": rms_flat}
-    findings["Tilt and form"] = Finding(seen, advice, {"level": order} if order else {}, values)
+    findings["Tilt and form"] = Property(seen, advice, {"level": order} if order else {}, values)
 
     treated = fill(treated) if treated.isnull().any() else treated
     borders = border_mismatch(treated)
     boundary: Literal["periodic", "mirror"] = "mirror" if max(borders) > JUMP else "periodic"
     seen = f"opposite borders differ {borders[0]:.2g} (x) and {borders[1]:.2g} times (y) as much as neighbouring rows"
-    findings["Borders"] = Finding(seen, f'boundary = "{boundary}"', {}, {"of_neighbours": borders})
+    findings["Borders"] = Property(seen, f'boundary = "{boundary}"', {}, {"of_neighbours": borders})
 
     findings["Noise"] = noise = _noise(treated)
     treated = gaussian_filter(treated, noise.step["filter"]) if noise.step else treated
     slope = rms_slope(treated)
     kind = "steeper" if slope > _STEEP else "flatter" if slope < _FLAT else ""
     advice = f"{kind} than almost any measured surface: check unit, spacing and height_scale" * bool(kind)
-    findings["Slope"] = Finding(f"{slope:.2g} rms after these steps", advice, {}, {"rms_slope": slope})
+    findings["Slope"] = Property(f"{slope:.2g} rms after these steps", advice, {}, {"rms_slope": slope})
 
-    proposed = {name: value for one in findings.values() for name, value in one.step.items()}
+    proposed = {name: value for finding in findings.values() for name, value in finding.step.items()}
     steps = {name: proposed[name] for name in STEPS if name in proposed}
     return Inspection(findings, steps, boundary, nominal_area(treated), slope)
 
@@ -216,7 +226,8 @@ def _clear_part(h: xr.DataArray, holes: np.ndarray) -> dict[str, Any]:
     side = math.ceil(max(h.shape) / _BLOCKS)  # points along the side of a block
     padded = np.pad(holes, [(0, -n % side) for n in h.shape])
     blocks = np.any(padded.reshape(padded.shape[0] // side, side, -1, side), axis=(1, 3))
-    clear_below, largest = np.zeros(blocks.shape[1], dtype=int), (0, (0, 0), (0, 0))
+    clear_below = np.zeros(blocks.shape[1], dtype=int)
+    largest = (0, (0, 0), (0, 0))
     for row, has_hole in enumerate(blocks):
         clear_below = np.where(has_hole, 0, clear_below + 1)  # clear blocks in each column, up to this row
         open_columns: list[tuple[int, int]] = []  # first column and number of rows of each rectangle that may grow
@@ -228,7 +239,8 @@ def _clear_part(h: xr.DataArray, holes: np.ndarray) -> dict[str, Any]:
             open_columns.append((first, count))
     limits = {}
     for axis, d, n, (first, end) in zip("xy", spacing(h), h.shape, largest[1:], strict=True):
-        first, end = first * side, min(end * side, n)
+        first = first * side
+        end = min(end * side, n)
         if end - first < min(n, _FEWEST):
             return {}
         if end - first < n:
@@ -238,7 +250,7 @@ def _clear_part(h: xr.DataArray, holes: np.ndarray) -> dict[str, Any]:
     return limits if largest[0] * side**2 >= _LEAST_PART * h.size else {}
 
 
-def _noise(h: xr.DataArray) -> Finding:
+def _noise(h: xr.DataArray) -> Property:
     """Measure the short-wave end of the spectrum, unless too few points were measured or the surface is flat.
 
     Filled points raise this end of the spectrum. Noise of 2 % of the rms height is overestimated by up to a third if
@@ -246,7 +258,7 @@ def _noise(h: xr.DataArray) -> Finding:
 
     Returns
     -------
-    Finding
+    Property
         Its values: ``rms``, the rms height of white noise as strong as the spectrum at its short-wave end [m];
         ``floor``, whether the spectrum is flat there, so that `rms` is the noise and not an upper bound; with a floor
         ``wavelength``, the shortest wave above the noise [m], and ``noisy_slopes``, the share of the shorter waves in
@@ -255,14 +267,17 @@ def _noise(h: xr.DataArray) -> Finding:
     gaps = h["filled"].values.astype(bool) if "filled" in h.coords else np.zeros(h.shape, dtype=bool)
     # points inside or at the edge of large holes are usually artefacts
     gaps = gaps | scipy.ndimage.binary_dilation(in_large_holes(gaps))
-    rms, cell = float(h.values.std()), max(spacing(h))
+    rms = float(h.values.std())
+    cell = max(spacing(h))
     if min(h.shape) < 16 or gaps.mean() > _MOST_MISSING or not rms > 1e-12 * np.abs(h.values).max():
         seen = "not known: the scan is flat, smaller than 16 points, or has too many missing points"
-        return Finding(seen, "", {}, {})
+        return Property(seen, "", {}, {})
     spectrum = _spectrum(h, gaps)
     waves = _complete(spectrum, h)
-    q, density = waves["wavevector"].values, waves["psd"].values
-    octave, area = q > q[-1] / 2, math.prod(spacing(h))
+    q = waves["wavevector"].values
+    density = waves["psd"].values
+    octave = q > q[-1] / 2
+    area = math.prod(spacing(h))
     tail = float(np.median(density[octave]))
     power = float(np.polyfit(np.log(q[octave]), np.log(np.maximum(density[octave], 1e-300)), 1)[0])
     below = np.flatnonzero(scipy.ndimage.median_filter(density, 5, mode="nearest") < _ABOVE * tail)
@@ -273,8 +288,9 @@ def _noise(h: xr.DataArray) -> Finding:
     if not floor:
         least = math.sqrt(float(np.median(density[q > 0.8 * q[-1]])) / area)
         seen = f"no noise floor down to two cells; noise is below {_length(least)} rms"
-        return Finding(seen, "", {}, {"rms": least, "floor": False})
-    noise, cutoff = math.sqrt(tail / area), float(2 * np.pi / q[below[0] - 1])
+        return Property(seen, "", {}, {"rms": least, "floor": False})
+    noise = math.sqrt(tail / area)
+    cutoff = float(2 * np.pi / q[below[0] - 1])
     every = spectrum["wavevector"].values
     slopes = spectrum["psd"].values * spectrum["modes"].values * every**2
     noisy = float(slopes[every > 2 * np.pi / cutoff].sum() / slopes.sum())
@@ -283,7 +299,7 @@ def _noise(h: xr.DataArray) -> Finding:
     step = {"filter": max(float(f"{cutoff:.2g}"), _rounded_up(3 * cell))} if is_harmful else {}
     values = {"rms": noise, "floor": True, "wavelength": cutoff, "noisy_slopes": noisy}
     advice = f'filter = "{written_quantity(step["filter"], "m")}" takes out these wavelengths' if is_harmful else ""
-    return Finding(seen, advice, step, values)
+    return Property(seen, advice, step, values)
 
 
 def _spectrum(h: xr.DataArray, gaps: np.ndarray) -> xr.Dataset:

@@ -42,6 +42,10 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
     InputError
         If all points are missing.
 
+    See Also
+    --------
+    roughvisc.inspect, roughvisc.psd, roughvisc.level
+
     Notes
     -----
     Slopes are first differences between neighbouring points. They underestimate short wavelengths: a wavelength of
@@ -52,6 +56,13 @@ def parameters(h: xr.DataArray, periodic: bool = False) -> xr.Dataset:
     References
     ----------
     .. [1] ISO 25178-2:2021, Surface texture: Areal, terms, definitions and parameters.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> wave = rv.wavy("1 um", "1 mm", "1 mm", 64, waves=1)
+    >>> round(float(rv.parameters(wave, periodic=True).Sq), 12)  # the amplitude over the root of two
+    7.07107e-07
     """
     h = checked(h, "parameters", least=1)
     require_heights(h, "parameters")

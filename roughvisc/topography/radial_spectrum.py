@@ -26,13 +26,14 @@ Convention = Literal["psd", "persson"]
 
 #: Convention of a spectral density -> its factor to the convention of this package.
 _FACTORS = {"psd": 1.0, "persson": (2 * math.pi) ** 2}
-# Rings of a scan are averaged over bins, so many in a decade.
+# Rings of a scan are averaged over bins, with this number in a decade.
 _BINS = 40
 # Values per decade of a spectrum for integrals, and fewest values.
-_PER_DECADE, _FEWEST = 60, 240
+_PER_DECADE = 60
+_FEWEST = 240
 # Density that counts as zero, over the largest one.
 _NOTHING = 1e-60
-# Ratio of the densities of two scans where they overlap, from which a warning is given.
+# Ratio of the densities of two overlapping scans, from which a warning is given.
 _DIFFERENT = 2.0
 
 
@@ -64,6 +65,10 @@ def psd_table(wavevectors: Sequence[Quantity], densities: Sequence[Quantity], *,
         If the columns differ in length, a wave number is not positive or not ascending, a density is negative or not
         finite, or the convention is unknown.
 
+    See Also
+    --------
+    roughvisc.psd, roughvisc.join_psd, roughvisc.from_spectrum, roughvisc.friction_theory
+
     Examples
     --------
     >>> import roughvisc as rv
@@ -77,7 +82,7 @@ def psd_table(wavevectors: Sequence[Quantity], densities: Sequence[Quantity], *,
 
 
 def join_psd(*spectra: xr.Dataset | xr.DataArray) -> xr.Dataset:
-    """Join radial spectra of different ranges, such as those of scans of different resolution.
+    """Join radial spectra of different ranges, such as spectra of scans of different resolution.
 
     Parameters
     ----------
@@ -102,10 +107,23 @@ def join_psd(*spectra: xr.Dataset | xr.DataArray) -> xr.Dataset:
     -----
     UserWarning
         If two densities differ by more than a factor of two in the mean over their overlap.
+
+    See Also
+    --------
+    roughvisc.psd, roughvisc.psd_table, roughvisc.friction_theory
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> long_waves = rv.psd_table([1e3, 1e5], [1e-15, 1e-22], convention="psd")
+    >>> short_waves = rv.psd_table([1e4, 1e6], [3.2e-19, 3.2e-26], convention="psd")
+    >>> q = rv.join_psd(long_waves, short_waves).wavevector
+    >>> round(float(q.min())), round(float(q.max()))
+    (1000, 1000000)
     """
     if not spectra:
         raise InputError(key="spectra", found=spectra, expected="at least one spectrum or map of heights")
-    columns = sorted((_columns(one) for one in spectra), key=lambda one: (one[0][0], one[0][-1]))
+    columns = sorted((_columns(spectrum) for spectrum in spectra), key=lambda pair: (pair[0][0], pair[0][-1]))
     reached = columns[0][0][-1]
     for q, _ in columns[1:]:
         if q[0] > reached:
@@ -116,7 +134,8 @@ def join_psd(*spectra: xr.Dataset | xr.DataArray) -> xr.Dataset:
     if len(columns) == 1:
         return _labelled(*columns[0])
     joined = np.unique(np.concatenate([q for q, _ in columns]))
-    total, weights = np.zeros(joined.size), np.zeros(joined.size)
+    total = np.zeros(joined.size)
+    weights = np.zeros(joined.size)
     for q, density in columns:
         inside = np.log(joined / q[0]), np.log(q[-1] / joined)
         weight = np.maximum(np.minimum(*inside), 0.0)
@@ -218,16 +237,20 @@ def _columns(source: Any) -> tuple[Array, Array]:
 
 
 def _checked_columns(wavevectors: ArrayLike, densities: ArrayLike) -> tuple[Array, Array]:
-    """Return two columns of a spectrum as arrays; refuse what is not one."""
-    q, density = np.asarray(wavevectors, dtype=float), np.asarray(densities, dtype=float)
+    """Return two columns of a spectrum as arrays; refuse anything else."""
+    q = np.asarray(wavevectors, dtype=float)
+    density = np.asarray(densities, dtype=float)
     if q.ndim != 1 or q.shape != density.shape or q.size < 2:
         found = f"{q.size} wave numbers and {density.size} densities"
         raise InputError(key="densities", found=found, expected="one for each wave number, at least two")
-    for row in np.flatnonzero(~(np.isfinite(q) & (q > 0)) | (np.diff(q, prepend=0.0) <= 0))[:1]:
-        raise InputError(
-            key=f"wavevectors[{row}]", found=q[row], expected="a positive number above the last one [rad/m]"
-        )
-    for row in np.flatnonzero(~(np.isfinite(density) & (density >= 0)))[:1]:
+    is_wrong = ~(np.isfinite(q) & (q > 0)) | (np.diff(q, prepend=0.0) <= 0)
+    if is_wrong.any():
+        row = is_wrong.argmax()
+        expected = "a positive number above the last one [rad/m]"
+        raise InputError(key=f"wavevectors[{row}]", found=q[row], expected=expected)
+    is_wrong = ~(np.isfinite(density) & (density >= 0))
+    if is_wrong.any():
+        row = is_wrong.argmax()
         raise InputError(key=f"densities[{row}]", found=float(density[row]), expected="a number, not negative [m4]")
     if not density.any():
         raise InputError(key="densities", found=0.0, expected="a positive density [m4]")
@@ -241,8 +264,8 @@ def _mismatch(columns: Sequence[tuple[Array, Array]]) -> float:
         for other, others in columns[place + 1 :]:
             if (low := max(q[0], other[0])) < (high := min(q[-1], other[-1])):
                 common = np.log(np.geomspace(low, high, 32)[1:-1])
-                one = np.interp(common, np.log(q), np.log(density))
-                worst = max(worst, abs(float(np.mean(np.interp(common, np.log(other), np.log(others)) - one))))
+                first = np.interp(common, np.log(q), np.log(density))
+                worst = max(worst, abs(float(np.mean(np.interp(common, np.log(other), np.log(others)) - first))))
     return math.exp(worst)
 
 

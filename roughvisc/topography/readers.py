@@ -29,7 +29,9 @@ from roughvisc.units import Quantity, format_quantity, number, quantities
 
 #: Largest side, finest spacing and largest distance of a height from zero. [m] Scans of 150 mm exist; absolute heights
 #: of 76 mm too.
-WIDEST, FINEST, HIGHEST = 1.0, 1e-11, 1.0
+WIDEST = 1.0
+FINEST = 1e-11
+HIGHEST = 1.0
 #: Fewest points for a check of the heights.
 _FEWEST = 16
 #: Heights of an array further from zero than this mark missing points. [m]
@@ -37,7 +39,9 @@ FARTHEST = 1e3
 #: A number marks missing points under four conditions: it is the lowest or highest height, it is at least this large in
 #: the file, it occurs at least this many times, and its distance from the next height exceeds this multiple of the
 #: range of all other heights. Exactly flat pits of a manufactured texture have smaller numbers.
-_NO_DATA, _REPEATED, _FAR = 999.0, 4, 10.0
+_NO_DATA = 999.0
+_REPEATED = 4
+_FAR = 10.0
 #: Usual marks of missing points, by size, for which one range is far enough: heights of 1 um are thousands of nm.
 _MARKS = (9999.0, 99999.0, 999999.0, 32767.0, 32768.0)
 _READER = threading.RLock()
@@ -45,7 +49,8 @@ _READER = threading.RLock()
 _OFF = 0.01
 #: Largest distance between points of one line of the lattice, over the distance between lines; and largest number of
 #: nodes per point.
-_WITHIN, _SPARSE = 0.1, 64
+_WITHIN = 0.1
+_SPARSE = 64
 #: Largest distance of a point from the border of a cell by rounding, in cells.
 _ON_BORDER = 1e-9
 
@@ -91,7 +96,8 @@ def _labelled(file: ScanFile, channel: Channel, given: Mapping[str, Any]) -> xr.
     sides: Any = channel.spacing
     values = np.asarray(raw, dtype=float)
     if channel.kind == "triangles":
-        values, sides = meshed(values, grid / xy, file.complaints), (grid / xy, grid / xy)
+        values = meshed(values, grid / xy, file.complaints)
+        sides = (grid / xy, grid / xy)
     elif channel.kind == "points":
         points = values[np.isfinite(values[:, :2]).all(axis=1)]
         points[:, 2] = _without_no_data(points[:, 2], no_data, file.complaints)
@@ -108,13 +114,16 @@ def _labelled(file: ScanFile, channel: Channel, given: Mapping[str, Any]) -> xr.
         x, y = channel.positions
         h = with_coordinates(values, x * xy, y * xy)
     if isinstance(raw, xr.DataArray):  # keep further attributes and coordinates of a grid file
-        h = h.assign_coords({name: (("x", "y"), one.values) for name, one in raw.coords.items() if one.ndim == 2})
+        h = h.assign_coords(
+            {name: (("x", "y"), coordinate.values) for name, coordinate in raw.coords.items() if coordinate.ndim == 2}
+        )
         h.attrs |= {key: value for key, value in raw.attrs.items() if key not in ("units", "long_name")}
     h = h.isel({axis: slice(None, None, -1) for axis in ("x", "y") if h[axis][0] > h[axis][-1]})
     h = checked(h, "an areal scan")
     for axis, d, n in zip(("x", "y"), cell_sides(h), h.shape, strict=True):
         if n * d > WIDEST or d < FINEST:
-            width, side = format_quantity(n * d, "m"), format_quantity(d, "m")
+            width = format_quantity(n * d, "m")
+            side = format_quantity(d, "m")
             found = f"it is {width} wide along {axis} at a spacing of {side}, which is not plausible"
             expected = "another unit or spacing, and height_scale if its heights are in another unit too"
             raise InputError(f"{found} (at most {WIDEST:g} m, at least {FINEST:g} m): expected {expected}")
@@ -147,7 +156,8 @@ def _metres(channel: Channel, given: Mapping[str, Any]) -> tuple[float, float]:
             raise InputError(
                 key="unit", found=given["unit"], expected=f"x and y in {channel.lateral_unit}, as in the file"
             )
-    xy, z = channel.lateral_unit or lateral or "m", stated or vertical
+    xy = channel.lateral_unit or lateral or "m"
+    z = stated or vertical
     return number(f"1 {xy}", "m", "unit"), number(f"1 {z}", "m", "unit")
 
 
@@ -156,7 +166,9 @@ def _units(unit: str | Sequence[str] | None) -> tuple[str | None, str | None]:
     if unit is None:
         return None, None
     parts = unit.split(",") if isinstance(unit, str) else unit if isinstance(unit, list | tuple) else ()
-    if not 0 < len(parts) <= 2 or not all(isinstance(one, str) and one.strip() for one in parts):
+    if not 0 < len(parts) <= 2 or not all(
+        isinstance(part_of_unit, str) and part_of_unit.strip() for part_of_unit in parts
+    ):
         expected = 'a unit of length, or those of x and y and of heights, such as "mm,um"'
         raise InputError(key="unit", found=unit, expected=expected)
     return parts[0].strip(), parts[-1].strip()
@@ -166,31 +178,33 @@ def _without_no_data(values: np.ndarray, no_data: float | None, complaints: list
     """Return heights with NaN at missing points, which a given number or an outlying number marks."""
     if no_data is not None:
         return np.where(np.isclose(values, number(no_data, "1", "no_data"), rtol=1e-6, atol=0.0), np.nan, values)
-    extremes = [one for one in {float(np.nanmin(values)), float(np.nanmax(values))} if abs(one) >= _NO_DATA]
-    extremes = sorted(one for one in extremes if np.count_nonzero(values == one) >= _REPEATED)
+    extremes = [extreme for extreme in {float(np.nanmin(values)), float(np.nanmax(values))} if abs(extreme) >= _NO_DATA]
+    extremes = sorted(extreme for extreme in extremes if np.count_nonzero(values == extreme) >= _REPEATED)
     rest = values[np.isfinite(values) & ~np.isin(values, extremes)]
     spread = float(np.ptp(rest)) if rest.size >= _FEWEST else 0.0
-    for one in extremes if spread > 0 else ():
-        if np.abs(rest - one).min() > (1.0 if abs(one) in _MARKS else _FAR) * spread:
-            here = values == one
+    for extreme in extremes if spread > 0 else ():
+        if np.abs(rest - extreme).min() > (1.0 if abs(extreme) in _MARKS else _FAR) * spread:
+            here = values == extreme
             values = np.where(here, np.nan, values)
             others = f"all others lie within {rest.min():g} to {rest.max():g}"
-            remedy = f"no_data = {one:g} confirms this, any other number keeps these heights"
-            complaints.append(f"{here.sum()} points have the height {one:g} and {others}: taken as missing; {remedy}")
+            remedy = f"no_data = {extreme:g} confirms this, any other number keeps these heights"
+            complaints.append(
+                f"{here.sum()} points have the height {extreme:g} and {others}: taken as missing; {remedy}"
+            )
     return values
 
 
 def _chosen(file: ScanFile, channel: int | str | None) -> Channel:
     """Return the channel of a name or a number; the default height if None."""
     named = ", ".join(f"{i}: {c.name!r}{'' if c.is_height else f' ({c.kind})'}" for i, c in enumerate(file.channels))
-    heights = {i: one for i, one in enumerate(file.channels) if one.is_height}
+    heights = {i: height_channel for i, height_channel in enumerate(file.channels) if height_channel.is_height}
     if not heights:
         raise InputError(f"it holds no heights over x and y (channels {named or 'none'}): expected an areal scan")
     if channel is None:
         channel = file.default if file.default in heights else min(heights)
-    for i, one in heights.items():
-        if channel in (i, one.name):
-            return one
+    for i, height_channel in heights.items():
+        if channel in (i, height_channel.name):
+            return height_channel
     raise InputError(key="channel", found=channel, expected=f"a height of {named}")
 
 
@@ -216,6 +230,17 @@ def from_array(heights: Any, spacing: Quantity | tuple[Quantity, Quantity]) -> x
     InputError
         If the array is not two-dimensional with at least two points along each axis, or contains infinite heights or
         no valid ones.
+
+    See Also
+    --------
+    roughvisc.open_scan, roughvisc.from_topography, roughvisc.save_scan
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> h = rv.from_array([[0.0, 1e-6, 2e-6], [1e-6, 2e-6, 3e-6]], spacing=("1 um", "2 um"))
+    >>> h.sel(x=0.5e-6, y=1e-6, method="nearest").item()
+    0.0
     """
     values = np.array(in_metres(heights, "heights"))
     if values.ndim != 2 or min(values.shape) < 2:
@@ -302,12 +327,12 @@ def laid_out(
         if empty := int(np.isnan(heights).sum()):
             complaints.append(f"{empty} of {heights.size} cells of the grid hold no point")
         return heights, (side, side)
-    if (found := lattice(points)) is None:
+    if (lattice := lattice_of(points)) is None:
         side = float(f"{2 * metres * math.sqrt(spread[0] * spread[1] / len(points)):.1g}")
         proposed = f'grid = "{format_quantity(side, "m").replace("µ", "u")}"'
         text = f"its {len(points)} points lie on no regular lattice: expected {proposed}, or similar"
         raise InputError(text, key="grid", expected="the side of the cells into which the points are sorted")
-    return found
+    return lattice
 
 
 def meshed(corners: np.ndarray, side: float, complaints: list[str]) -> np.ndarray:
@@ -333,7 +358,7 @@ def meshed(corners: np.ndarray, side: float, complaints: list[str]) -> np.ndarra
     return heights
 
 
-def lattice(points: np.ndarray) -> tuple[np.ndarray, tuple[float, float]] | None:
+def lattice_of(points: np.ndarray) -> tuple[np.ndarray, tuple[float, float]] | None:
     """Return the heights and steps of the lattice of some points, to a hundredth of a step; None without a lattice.
 
     Parameters
@@ -348,19 +373,20 @@ def lattice(points: np.ndarray) -> tuple[np.ndarray, tuple[float, float]] | None
     steps : tuple of float
         Along x and y, in the unit of the points.
     """
-    at, nodes = points[:, :2], np.empty((len(points), 2))
+    places = points[:, :2]
+    nodes = np.empty((len(points), 2))
     for axis in (0, 1):
-        ordered = np.sort(at[:, axis])
+        ordered = np.sort(places[:, axis])
         gaps = np.diff(ordered)
         starts = np.append(0, np.flatnonzero(gaps > _WITHIN * gaps.max()) + 1)
         lines = np.add.reduceat(ordered, starts) / np.diff(np.append(starts, ordered.size))
         between = np.diff(lines)
         step = (lines[-1] - lines[0]) / np.round(between / np.median(between)).sum()
-        nodes[:, axis] = np.round((at[:, axis] - lines[0]) / step)
+        nodes[:, axis] = np.round((places[:, axis] - lines[0]) / step)
     centred = np.column_stack([np.ones(len(points)), nodes - nodes.mean(axis=0)])
-    fit = np.linalg.lstsq(centred, at, rcond=None)[0]
+    fit = np.linalg.lstsq(centred, places, rcond=None)[0]
     steps = np.array([fit[1, 0], fit[2, 1]])
-    off = np.vstack([at - centred @ fit, [fit[1, 1], fit[2, 0]]])
+    off = np.vstack([places - centred @ fit, [fit[1, 1], fit[2, 0]]])
     if (np.abs(off) > _OFF * steps).any():
         return None
     i, j = (nodes - nodes.min(axis=0)).astype(int).T
@@ -383,7 +409,8 @@ def gridded(points: np.ndarray, side: float) -> np.ndarray:
         Side of the cells, in the unit of the points.
     """
     points = points[np.isfinite(points).all(axis=1)]
-    low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+    low = points[:, :2].min(axis=0)
+    high = points[:, :2].max(axis=0)
     shape = np.maximum(np.ceil((high - low) / side - _ON_BORDER), 1)
     if min(shape) < 2 or np.prod(shape) > MOST_CELLS:
         raise InputError(key="grid", found=side, expected=f"a side that fits at least twice into {high - low}")

@@ -57,6 +57,17 @@ def sphere(radius: Quantity, size: Any, shape: Any) -> xr.DataArray:
     ------
     InputError
         If a parameter is not positive and finite.
+
+    See Also
+    --------
+    roughvisc.cone, roughvisc.flat_punch, roughvisc.closed_forms.hertz
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> ball = rv.sphere(radius="1 mm", size="200 um", shape=45)
+    >>> ball.shape
+    (45, 45)
     """
     return _indenter("sphere", {"radius": radius}, size, shape)
 
@@ -83,6 +94,16 @@ def cone(slope: float, size: Any, shape: Any) -> xr.DataArray:
     ------
     InputError
         If a parameter is not positive and finite.
+
+    See Also
+    --------
+    roughvisc.sphere, roughvisc.flat_punch, roughvisc.closed_forms.cone
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rv.cone(slope=0.1, size="200 um", shape=(41, 41)).shape
+    (41, 41)
     """
     return _indenter("cone", {"slope": slope}, size, shape)
 
@@ -109,6 +130,17 @@ def flat_punch(radius: Quantity, size: Any, shape: Any) -> xr.DataArray:
     ------
     InputError
         If a parameter is not positive and finite, or no cell centre lies within the radius.
+
+    See Also
+    --------
+    roughvisc.sphere, roughvisc.cone, roughvisc.closed_forms.flat_punch
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> punch = rv.flat_punch(radius="50 um", size="200 um", shape=41)
+    >>> punch.attrs["missing"]
+    'absent'
     """
     return _indenter("flat_punch", {"radius": radius}, size, shape)
 
@@ -139,14 +171,25 @@ def wavy(amplitude: Quantity, wavelength: Quantity, size: Any, shape: Any, waves
     ------
     InputError
         If a parameter is not positive and finite, `waves` is neither 1 nor 2, or the waves do not fit the domain.
+
+    See Also
+    --------
+    roughvisc.self_affine, roughvisc.closed_forms.westergaard, roughvisc.closed_forms.johnson_greenwood_higginson
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> wave = rv.wavy(amplitude="1 um", wavelength="1 mm", size="1 mm", shape=64)
+    >>> round(float(rv.parameters(wave, periodic=True).Sq), 9)
+    5e-07
     """
     size = pair("size", size)
     one_of("waves", waves, (1, 2))
     for side in size[:waves]:
         periods = side / wavelength
         if round(periods) < 1 or abs(periods - round(periods)) > 1e-9 * periods:
-            held = f"{format_quantity(side, 'm')} holds {periods:.6g}"
-            expected = f"a whole number of wavelengths, so that the waves repeat; {held}"
+            message = f"{format_quantity(side, 'm')} holds {periods:.6g}"
+            expected = f"a whole number of wavelengths, so that the waves repeat; {message}"
             raise InputError(key="size", found=size, expected=expected)
     shape = cells(shape)
     repeats = (round(size[0] / wavelength), round(size[1] / wavelength) * (waves == 2))
@@ -215,6 +258,10 @@ def self_affine(
         If a parameter is out of range, `amplitudes` is unknown, both or none of `rms_slope` and `rms_height` are given,
         or no wavelength of the domain lies between roll-off and short cut-off.
 
+    See Also
+    --------
+    roughvisc.from_spectrum, roughvisc.surrogates, roughvisc.wavy
+
     Notes
     -----
     The spectrum is :math:`C \propto \max(q, q_r)^{-2 - 2H}` for :math:`q < q_s`. Phases are uniform and independent.
@@ -229,6 +276,13 @@ def self_affine(
     ----------
     .. [1] T. D. B. Jacobs, T. Junge, L. Pastewka, Surf. Topogr.: Metrol. Prop. 5 (2017) 013001.
     .. [2] NumPy reference, "Parallel random number generation", SeedSequence spawning.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rough = rv.self_affine("1 mm", 64, hurst=0.8, rms_height="1 um", seed=1)
+    >>> round(float(rv.parameters(rough).Sq), 9)
+    1e-06
     """
     size = pair("size", size)
     stated_seed = None if isinstance(seed, np.random.Generator) else whole("seed", seed)
@@ -305,6 +359,10 @@ def from_spectrum(
     InputError
         If a parameter is out of range, or no wave of the domain is in the spectrum.
 
+    See Also
+    --------
+    roughvisc.psd_table, roughvisc.self_affine
+
     Notes
     -----
     A wave has the mean square amplitude :math:`C(q) / A` on the area :math:`A`, in the convention of
@@ -349,7 +407,8 @@ def finest_wave(size: tuple[float, float], shape: tuple[int, int], anisotropy: f
 
 
 def _indenter(name: str, parameters: dict[str, Any], size: Any, shape: Any) -> xr.DataArray:
-    size, shape = pair("size", size), cells(shape)
+    size = pair("size", size)
+    shape = cells(shape)
     x = (np.arange(shape[0]) + 0.5) * (size[0] / shape[0]) - size[0] / 2
     y = (np.arange(shape[1]) + 0.5) * (size[1] / shape[1]) - size[1] / 2
     heights = _INDENTERS[name](x[:, None], y, **parameters)
@@ -377,14 +436,16 @@ def indenter_of(h: xr.DataArray) -> tuple[Callable[..., np.ndarray], tuple[float
     try:
         recipe = json.loads(h.attrs["recipe"])
         evaluate = partial(_INDENTERS[recipe["name"]], **recipe["parameters"])
-        (width, depth), (nx, ny) = recipe["size"], recipe["shape"]
-        cell, centre = (width / nx, depth / ny), (width / 2, depth / 2)
+        width, depth = recipe["size"]
+        nx, ny = recipe["shape"]
+        cell = (width / nx, depth / ny)
+        centre = (width / 2, depth / 2)
         expected = evaluate(h["x"].values[:, None] - centre[0], h["y"].values - centre[1])
     except (KeyError, TypeError, ValueError, IndexError, ZeroDivisionError, AttributeError):
         return None
     for axis, side in zip("xy", cell, strict=True):
-        at = h[axis].values / side - 0.5
-        if np.abs(at - round(at[0]) - np.arange(at.size)).max() > 1e-6:
+        place = h[axis].values / side - 0.5
+        if np.abs(place - round(place[0]) - np.arange(place.size)).max() > 1e-6:
             return None
     near = 1e-9 * np.nanmax(np.abs(expected), initial=0.0)
     if not np.allclose(h.transpose("x", "y").values, expected, rtol=0, atol=near, equal_nan=True):
@@ -457,6 +518,10 @@ def surrogates(h: xr.DataArray, count: int, *, seed: int) -> xr.DataArray:
     InputError
         If points are missing, `count` is not a positive whole number, or `seed` is not valid.
 
+    See Also
+    --------
+    roughvisc.self_affine, roughvisc.over_realisations
+
     Notes
     -----
     The surrogate is a Gaussian random field, as in :func:`self_affine` with Gaussian amplitudes. The
@@ -477,8 +542,8 @@ def surrogates(h: xr.DataArray, count: int, *, seed: int) -> xr.DataArray:
     3
     """
     numbers = range(1, whole("count", count, 1) + 1)
-    found = [surrogate(h, number, seed=seed) for number in numbers]
-    return xr.concat(found, xr.DataArray(np.array(numbers), dims="realisation", name="realisation"))
+    surfaces = [surrogate(h, number, seed=seed) for number in numbers]
+    return xr.concat(surfaces, xr.DataArray(np.array(numbers), dims="realisation", name="realisation"))
 
 
 def surrogate(h: xr.DataArray, number: int, *, seed: int = 0) -> xr.DataArray:
@@ -488,7 +553,8 @@ def surrogate(h: xr.DataArray, number: int, *, seed: int = 0) -> xr.DataArray:
     if is_mirrored(h):
         h = h[: h.shape[0] // 2, : h.shape[1] // 2]  # the part that was measured
     repeating = h if is_periodic(h) else mirror(h)
-    spectrum, step = psd(repeating), 2 * np.pi / min(period_of(repeating))  # the width of its rings
+    spectrum = psd(repeating)
+    step = 2 * np.pi / min(period_of(repeating))  # the width of its rings
     sides = spacing(h)
     q_x, q_y, _ = waves_of_grid(h.shape, sides)
     q = np.hypot(q_x[:, None], q_y)
@@ -524,18 +590,18 @@ def random_heights(amplitude: np.ndarray, ny: int, entropy: list[int], *, normal
     ndarray, shape (nx, ny)
         Heights. [m]
     """
-    nx, held = amplitude.shape
-    centres = np.exp(1j * np.pi * np.arange(held) / ny)  # from the corner to the first centre, half a cell
-    spectrum = np.zeros((nx, held), dtype=complex)
-    for row, part in enumerate(amplitude):
-        count = int(np.flatnonzero(part).max(initial=-1)) + 1
+    nx, drawn = amplitude.shape
+    centres = np.exp(1j * np.pi * np.arange(drawn) / ny)  # from the corner to the first centre, half a cell
+    spectrum = np.zeros((nx, drawn), dtype=complex)
+    for row, row_of_amplitudes in enumerate(amplitude):
+        count = int(np.flatnonzero(row_of_amplitudes).max(initial=-1)) + 1
         k_x = row if 2 * row < nx else row - nx
         key = 2 * k_x if k_x >= 0 else -2 * k_x - 1
         seeds = (np.random.SeedSequence(entropy, spawn_key=(key, i)) for i in (0, 1))
         phases, powers = map(np.random.default_rng, seeds)
         waves = np.exp(2j * np.pi * phases.random(count))
         waves = waves * np.sqrt(powers.standard_exponential(count)) if normal else waves
-        spectrum[row, :count] = part[:count] * (np.exp(1j * np.pi * k_x / nx) * centres[:count]) * waves
+        spectrum[row, :count] = row_of_amplitudes[:count] * (np.exp(1j * np.pi * k_x / nx) * centres[:count]) * waves
     half = (nx - 1) // 2  # the first column holds both halves: make it Hermitian
     spectrum[nx - half :, 0] = spectrum[1 : half + 1, 0][::-1].conj()
     return scipy.fft.irfft(scipy.fft.ifft(spectrum, axis=0, norm="forward"), ny, axis=1, norm="forward")

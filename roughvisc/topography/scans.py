@@ -110,6 +110,17 @@ def open_scan(
     UserWarning
         If the checksum in an X3P file is wrong, an index row or column is removed, a number is taken for missing
         points, or cells of `grid` hold no point.
+
+    See Also
+    --------
+    roughvisc.inspect, roughvisc.level, roughvisc.from_array, roughvisc.supported_formats
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> scan = rv.open_scan(rv.example_scan())
+    >>> scan.shape, scan.attrs["format"]
+    ((160, 256), 'x3p')
     """
     options = {
         "format": format,
@@ -130,9 +141,10 @@ def open_scan(
     about, table = read_card(path)
     try:
         one_key("the card", table, ("file", "generate"))
-        stated, file = about.pop("sha256", None), table.get("file")
-        if stated and file and stated.lower() != (found := sha256(existing(file, "file"))):
-            expected = f"{found}, that of {Path(file).name}, which was changed or damaged"
+        stated = about.pop("sha256", None)
+        file = table.get("file")
+        if stated and file and stated.lower() != (checksum := sha256(existing(file, "file"))):
+            expected = f"{checksum}, that of {Path(file).name}, which was changed or damaged"
             raise InputError(key="sha256", found=stated, expected=expected)
         h = condition(raw_height("", table), split(table, *STEPS)[0])
     except InputError as error:
@@ -155,8 +167,24 @@ def save_scan(h: xr.DataArray, path: _Path) -> None:
     ------
     InputError
         If the suffix is unknown, or `h` is not a height grid.
+
+    See Also
+    --------
+    roughvisc.open_scan, roughvisc.from_array, roughvisc.to_topography
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import roughvisc as rv
+    >>> rough = rv.self_affine("1 mm", 32, hurst=0.8, rms_height="1 um", seed=1)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     rv.save_scan(rough, f"{folder}/rough.nc")
+    ...     again = rv.open_scan(f"{folder}/rough.nc")
+    >>> bool((again == rough).all())
+    True
     """
-    h, path = checked(h, "save_scan"), path_of(path, "path")
+    h = checked(h, "save_scan")
+    path = path_of(path, "path")
     known_suffix(path)
     if path.suffix.lower() == ".nc":
         compressed: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
@@ -381,9 +409,9 @@ def written_quantity(value: float, unit: str, digits: int = 6) -> str:
 def toml_text(value: Any, digits: int | None = None) -> str:
     """Return a value as TOML; if `digits` is given, numbers are written as lengths with this many digits."""
     if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {toml_text(one, digits)}" for key, one in value.items()) + " }"
+        return "{ " + ", ".join(f"{key} = {toml_text(inner, digits)}" for key, inner in value.items()) + " }"
     if isinstance(value, list | tuple):
-        return f"[{', '.join(toml_text(one, digits) for one in value)}]"
+        return f"[{', '.join(toml_text(inner, digits) for inner in value)}]"
     text = value if digits is None else written_quantity(float(value), "m", digits)
     if isinstance(text, float):
         return str(text)  # inf and nan are Infinity and NaN in JSON

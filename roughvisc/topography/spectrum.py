@@ -126,6 +126,10 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
     InputError
         If points are missing, or the window is unknown.
 
+    See Also
+    --------
+    roughvisc.psd_table, roughvisc.join_psd, roughvisc.parameters, roughvisc.plot.surface
+
     Notes
     -----
     The density is :math:`C(\mathbf q) = |\tilde h|^2 / A` with :math:`\tilde h = \Delta x \Delta y \sum h\, e^{-i
@@ -141,6 +145,14 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
     References
     ----------
     .. [1] T. D. B. Jacobs, T. Junge, L. Pastewka, Surf. Topogr.: Metrol. Prop. 5 (2017) 013001.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rough = rv.self_affine("1 mm", 32, hurst=0.8, rms_height="1 um", seed=1)
+    >>> spectrum = rv.psd(rough)
+    >>> round(float((spectrum.psd * spectrum.modes).sum() / 1e-3**2) ** 0.5, 9)  # the rms height
+    1e-06
     """
     h = checked(h, "psd", least=1)
     require_complete(h, "psd")
@@ -155,13 +167,15 @@ def psd(h: xr.DataArray, window: Literal["hann"] | None = None) -> xr.Dataset:
     ring = ring_numbers(q, step)
     ring[q == 0] = 0  # the mean
     count = np.broadcast_to(stands_for, q.shape)
-    counted, at, total = (np.bincount(ring.ravel(), one.ravel())[1:] for one in (count, count * q, count * density))
+    counted, mean_wave, total = (
+        np.bincount(ring.ravel(), weights.ravel())[1:] for weights in (count, count * q, count * density)
+    )
     ring = np.flatnonzero(counted)
     density_attrs = {"units": "m^4", "long_name": "power spectral density of height, radial average"}
     variables = {
         "psd": ("wavevector", total[ring] / counted[ring], density_attrs),
         "modes": ("wavevector", counted[ring].astype(int), {"units": "1", "long_name": "waves in the ring"}),
-        "wavevector": ("wavevector", at[ring] / counted[ring], {"units": "rad/m", "long_name": "wavevector"}),
+        "wavevector": ("wavevector", mean_wave[ring] / counted[ring], {"units": "rad/m", "long_name": "wavevector"}),
     }
     return xr.Dataset(variables, attrs={"area": h.size * cells[0] * cells[1]})
 
@@ -198,6 +212,10 @@ def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | Non
     InputError
         If `shape` is not a pair of whole numbers of at least 2.
 
+    See Also
+    --------
+    roughvisc.without_short_waves, roughvisc.gaussian_filter, roughvisc.crop
+
     Notes
     -----
     A periodic surface is expanded in a Fourier series. Any other surface and its mirror images are expanded in cosines.
@@ -212,6 +230,14 @@ def resample(h: xr.DataArray, shape: int | tuple[int, int], periodic: bool | Non
 
     where the last factor accounts for the distance between the first centres of both grids. A wavelength of exactly two
     old cells is kept on a finer grid, as the sine that is largest at the old centres.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rough = rv.self_affine("1 mm", 64, hurst=0.8, rms_height="1 um", seed=1)
+    >>> coarse = rv.resample(rough, 32)
+    >>> coarse.shape, bool(abs(coarse.mean()) < 1e-18)
+    ((32, 32), True)
     """
     shape = counts("shape", shape)
     h = checked(h, "resample")
@@ -258,6 +284,18 @@ def without_short_waves(h: xr.DataArray, shortest: Quantity, periodic: bool | No
     ------
     InputError
         If points are missing or the length is out of its range.
+
+    See Also
+    --------
+    roughvisc.gaussian_filter, roughvisc.resample
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rough = rv.self_affine("1 mm", 64, hurst=0.8, rms_height="1 um", seed=1)
+    >>> smooth = rv.without_short_waves(rough, "0.2 mm")
+    >>> bool(rv.parameters(smooth).Sdq < rv.parameters(rough).Sdq)
+    True
     """
     h = checked(h, "without_short_waves")
     sides = spacing(h)

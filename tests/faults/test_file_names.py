@@ -130,7 +130,7 @@ def test_empty_path__is_refused_by_every_function(swept, tmp_path, monkeypatch):
     calls = [("path", read) for read in reads]
     calls += [("out", rv.open_results), ("out", rv.to_table), ("results", rv.report)]
     calls += [("path", lambda path: rv.to_csv(ds, path)), ("path", lambda path: rv.plot.animate(ds, path))]
-    calls += [("path", lambda path: rv.save_scan(ds.height, path)), ("out", lambda out: rv.report(ds, out))]
+    calls += [("path", lambda path: rv.save_scan(ds.height, path)), ("path", lambda path: rv.report(ds, path))]
     for function in (rv.run, rv.trade, rv.budget):
         calls.append(("out", lambda out, function=function: function(case, out=out, progress=False)))
     for function in (rv.sweep, rv.plan, rv.observe):

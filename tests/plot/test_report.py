@@ -8,10 +8,9 @@ import tomllib
 import pytest
 import sample_results as made
 from click.testing import CliRunner
-from support import BALL
+from support import BALL, refused
 
 from roughvisc.cli import main
-from roughvisc.errors import InputError
 from roughvisc.plot.report import report
 from roughvisc.runs.csv_files import to_table
 from roughvisc.runs.folder import write_json
@@ -102,7 +101,7 @@ def test_page__of_a_result_without_a_study(within, tmp_path):
     assert ("<td>0.003</td>" in text) == within
     assert "do not record the whole study" in text
     assert "<td>not estimated (grid_error = true in [solve])</td>" in text
-    with pytest.raises(InputError, match="out is None"):
+    with refused("path", None):
         report(ds)
 
 

@@ -85,7 +85,7 @@ def test_run_and_sweep__compute_what_is_observed(study, tmp_path):
     added = rv.observe(path, tmp_path / "out", progress=lambda done, of: told.append((done, of)))
     assert sorted(one.stem for one in added) == sorted(case.key for case in read_cases(path))
     assert told == [(0, 2), (1, 2)]
-    assert rv.observe(path, tmp_path / "out") == []
+    assert rv.observe(path, tmp_path / "out", progress=False) == []
     assert all(rv.open_result(one).roughvisc.steps.sizes["step"] > 3 for one in added), "the steps stay in the file"
     np.testing.assert_allclose(4 * rv.open_results(tmp_path / "out").leak_rate, swept.leak_rate, rtol=1e-12, atol=0)
 

@@ -2,6 +2,7 @@
 
 import json
 import pickle
+from functools import partial
 
 import numpy as np
 import pytest
@@ -118,6 +119,16 @@ def test_key__of_a_scan_does_not_depend_on_its_card_or_the_name_of_a_unit(studie
     assert keys[0] == keys[1] == keys[2] != keys[3]
 
 
+def test_key__of_heights_is_equal_for_a_load_and_its_nominal_pressure(tmp_path):
+    area = SCAN.sizes["x"] * SCAN.sizes["y"] * 6e-6 * 7e-6
+    press = rv.Program().pressure(1e-5 / area, over="50 ms").hold("0.2 s")
+    pressed = rv.Case(SCAN, RUBBER, press, boundary="mirror", tolerance=1e-2, times=4)
+    assert pressed.key == HEIGHTS.key != rv.vary(HEIGHTS, {"program": PRESS.hold("1 s")}).key
+    assert rv.read_study(pressed.to_toml(tmp_path / "study.toml")).key == pressed.key
+    by_pressure = rv.run(pressed, tmp_path / "pressure", progress=False)
+    assert_equal(by_pressure, rv.run(HEIGHTS, tmp_path / "load", progress=False))
+
+
 PROGRAMS = {"ramp": PRESS, "cycles": PRESS.cycle("10 uN", "3 uN", "0.1 s", 3), "slide": PRESS.slide("20 um", over=1)}
 
 
@@ -151,6 +162,15 @@ def test_adhesion__comes_back_from_the_study_file_and_counts_in_the_key(tmp_path
         assert rv.vary(weak, {"adhesion": none}).key == CASE.key != weak.key
 
 
+def test_html__shows_the_case_in_units():
+    times = np.arange(9.0)
+    material = rv.creep_table(times, 1e-6 * (1 + times), kind="shear")
+    case = rv.Case(WAVES, material, PRESS, title="<hold>", observe={"leakage": {"viscosity": "2 mPa s"}})
+    text = case._repr_html_()
+    for words in ("&lt;hold&gt;", "size 100 µm", "0 s to 8 s (9 values)", "hold 200 ms", "viscosity 2 mPa s", case.key):
+        assert words in text, words
+
+
 def test_vary__makes_the_product_and_pairs_and_names_objects():
     programs = {name: PROGRAMS[name] for name in ("ramp", "cycles")}
     cases = rv.vary(CASE, {"program": programs, "tolerance": ["1 %", 1e-3]})
@@ -180,6 +200,19 @@ def test_sweep__stores_heights_once_and_its_names_are_coordinates(tmp_path):
     assert len(list(tmp_path.glob("heights-*.nc"))) == 1
     rv.sweep(cases, tmp_path, workers=0, progress=False)
     assert "0 of them to compute" in (tmp_path / "sweep.log").read_text()
+
+
+def test_folder__with_the_sweep_of_another_study_is_refused(tmp_path):
+    first = rv.vary(CASE, {"title": "first"})
+    rv.sweep([first], tmp_path, workers=0, progress=False)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    other = rv.vary(first, {"title": "second", "tolerance": 2e-2})
+    for call in (rv.run, partial(rv.sweep, workers=0)):
+        with refused("out", str(tmp_path)):
+            call(other if call is rv.run else [other], tmp_path, progress=False)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    changed = rv.vary(first, {"tolerance": 2e-2})
+    assert rv.sweep([changed], tmp_path, workers=0, progress=False).sizes["case"] == 1
 
 
 class OwnKernel(type(rv.Body(RUBBER).kernel)):

@@ -51,6 +51,10 @@ def fractional_zener(
     InputError
         If a value is out of its range.
 
+    See Also
+    --------
+    roughvisc.zener, roughvisc.power_law, roughvisc.creep
+
     References
     ----------
     .. [1] F. Mainardi, *Fractional Calculus and Waves in Linear Viscoelasticity*, Imperial College Press, 2010,

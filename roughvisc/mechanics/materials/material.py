@@ -126,6 +126,17 @@ class Prony:
     InputError
         If a value is negative or not finite, a retardation time is not positive, the Poisson ratio lies
         outside (-1, 0.5], or the material is rigid.
+
+    See Also
+    --------
+    roughvisc.zener, roughvisc.from_relaxation, roughvisc.creep_table, roughvisc.creep
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rubber = rv.Prony("0.3 1/MPa", compliances=["1 1/MPa"], times=["1 min"])
+    >>> float(rubber.creep_compliance(0.0)), round(float(rubber.creep_compliance(1e6)), 12)
+    (3e-07, 1.3e-06)
     """
 
     glassy: Quantity
@@ -455,6 +466,10 @@ def creep(
     InputError
         If a function cannot be called, or a number is out of its range.
 
+    See Also
+    --------
+    roughvisc.power_law, roughvisc.Prony, roughvisc.creep_table
+
     Examples
     --------
     >>> import numpy as np
@@ -500,6 +515,10 @@ def power_law(
     InputError
         If a value is out of its range.
 
+    See Also
+    --------
+    roughvisc.fractional_zener, roughvisc.creep
+
     Examples
     --------
     >>> gel = power_law(glassy=0.0, coefficient=1e-4, exponent=0.5)
@@ -541,6 +560,15 @@ def pair(a: Material, b: Material) -> Material:
     -------
     Prony or Creep
         A series if both materials are series. Its Poisson ratio is a half; each body keeps its own ratio.
+
+    Raises
+    ------
+    InputError
+        If an argument is not a material.
+
+    See Also
+    --------
+    roughvisc.combine
 
     Examples
     --------
@@ -597,6 +625,10 @@ def wlf(temperature: Quantity, reference_temperature: Quantity, wlf_c1: float, w
         If a number is not positive and finite, or the temperature is not above ``T_r - c2``, where the formula is not
         defined.
 
+    See Also
+    --------
+    roughvisc.arrhenius, roughvisc.shift, roughvisc.thermal
+
     Notes
     -----
     .. math:: \log_{10} a_T = -\frac{c_1 (T - T_r)}{c_2 + T - T_r}
@@ -641,6 +673,10 @@ def arrhenius(temperature: Quantity, reference_temperature: Quantity, activation
     InputError
         If a number is not positive and finite.
 
+    See Also
+    --------
+    roughvisc.wlf, roughvisc.shift, roughvisc.thermal
+
     Notes
     -----
     .. math:: \ln a_T = \frac{E_a}{R} \left(\frac{1}{T} - \frac{1}{T_r}\right)
@@ -678,6 +714,10 @@ def shift(material: Material, factor: float) -> Material:
     ------
     InputError
         If the factor is not between 1e-30 and 1e30.
+
+    See Also
+    --------
+    roughvisc.wlf, roughvisc.arrhenius, roughvisc.thermal
 
     Notes
     -----
@@ -729,6 +769,10 @@ def thermal(
     ------
     InputError
         If a number is wrong, or the law is not stated by either `wlf_c1` and `wlf_c2` or `activation_energy`.
+
+    See Also
+    --------
+    roughvisc.wlf, roughvisc.arrhenius, roughvisc.shift
 
     Examples
     --------

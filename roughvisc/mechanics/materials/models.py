@@ -59,6 +59,10 @@ def elastic(
     InputError
         If a number is not positive and finite, or both or none of `shear_modulus` and `young_modulus` are given.
 
+    See Also
+    --------
+    roughvisc.zener, roughvisc.kelvin_voigt
+
     Examples
     --------
     >>> float(elastic(young_modulus="2.6 MPa", poisson=0.3).creep_compliance(0.0))
@@ -93,6 +97,17 @@ def maxwell(shear_modulus: Quantity, viscosity: Quantity, poisson: float = 0.5) 
     ------
     InputError
         If a number is not positive and finite.
+
+    See Also
+    --------
+    roughvisc.kelvin_voigt, roughvisc.zener
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> fluid = rv.maxwell(shear_modulus="1 MPa", viscosity="1 MPa s")
+    >>> float(fluid.creep_compliance(3.0))  # (1 + 3) / MPa
+    4e-06
     """
     return Prony(1 / shear_modulus, 1 / viscosity, poisson=poisson)
 
@@ -119,6 +134,17 @@ def kelvin_voigt(shear_modulus: Quantity, viscosity: Quantity, poisson: float = 
     ------
     InputError
         If a number is not positive and finite.
+
+    See Also
+    --------
+    roughvisc.maxwell, roughvisc.zener
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> gel = rv.kelvin_voigt(shear_modulus="1 MPa", viscosity="1 MPa s")
+    >>> round(float(gel.creep_compliance(1e3)), 12)
+    1e-06
     """
     return Prony(0.0, 0.0, (1 / shear_modulus,), (viscosity / shear_modulus,), poisson)
 
@@ -149,6 +175,10 @@ def zener(shear_modulus: Quantity, kelvin_modulus: Quantity, kelvin_viscosity: Q
     ------
     InputError
         If a number is not positive and finite.
+
+    See Also
+    --------
+    roughvisc.kelvin_voigt, roughvisc.maxwell, roughvisc.from_relaxation, roughvisc.fractional_zener
 
     Examples
     --------
@@ -268,6 +298,10 @@ def from_relaxation(
         If a modulus is negative, a time is not positive, or their numbers differ; if all moduli are zero; if the ratios
         exceed one in sum, reach one with a long-term modulus, or are given as moduli; if a bulk modulus is given with a
         Poisson ratio, or is below a ninth of Young's modulus; if bulk ratios are given with Young's moduli.
+
+    See Also
+    --------
+    roughvisc.relaxation_table, roughvisc.Prony
 
     Examples
     --------

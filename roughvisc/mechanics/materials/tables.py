@@ -110,11 +110,22 @@ def creep_table(
         earlier one by more than the noise; the message names the row, counted from 0. Programs longer than the table
         are refused later.
 
+    See Also
+    --------
+    roughvisc.read_material, roughvisc.relaxation_table, roughvisc.dynamic_table, roughvisc.creep
+
     Notes
     -----
     A compliance at time zero is the instantaneous compliance. Before a first row at a later time, the first decade of
     rows is extrapolated to time zero as a power of time or by a decade of logarithmic creep, whichever falls less, and
     to a tenth of the first row at least. For several temperatures see :func:`dynamic_table`.
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rubber = rv.creep_table(["0 s", "1 s", "10 s"], ["1 1/MPa", "1.5 1/MPa", "2 1/MPa"], kind="shear")
+    >>> bool(abs(rubber.creep_compliance(1.0) - 1.5e-6) < 1e-7)
+    True
     """
     columns = _columns(("time", "compliance"), times, compliances)
     known = _Measured("creep", kind, noise, poisson, vertical, note)
@@ -163,12 +174,25 @@ def relaxation_table(
     InputError
         If a row is not finite, not in order of time, or negative by more than noise; the row is named, counted from 0.
 
+    See Also
+    --------
+    roughvisc.read_material, roughvisc.creep_table, roughvisc.dynamic_table, roughvisc.from_relaxation
+
     Notes
     -----
     ``G(t) = G_e + sum G_k exp(-t / theta_k)`` by non-negative least squares of the relative misfit on a lattice of
     ``theta``; then :func:`~roughvisc.mechanics.materials.models.relaxation_series`, which is exact. Outside the
     measured times its slowest and its fastest terms determine the series. For several temperatures see
     :func:`dynamic_table`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import roughvisc as rv
+    >>> times = np.logspace(-2, 1, 13)
+    >>> rubber = rv.relaxation_table(times, 1e6 + 2e6 * np.exp(-times), kind="shear")
+    >>> bool(abs(rubber.creep_compliance(100.0) - 1e-6) < 1e-7)
+    True
     """
     columns = _columns(("time", "modulus"), times, moduli)
     known = _Measured("relaxation", kind, noise, poisson, vertical, note)
@@ -236,6 +260,10 @@ def dynamic_table(
         rows of one frequency have moduli that differ by more than 10 % or twice the noise; if all rows have one
         frequency; or if the temperature is not within those of the rows. The row is named.
 
+    See Also
+    --------
+    roughvisc.read_material, roughvisc.creep_table, roughvisc.relaxation_table, roughvisc.plot.master_curve
+
     Notes
     -----
     ``G' = G_e + sum G_k w^2 theta_k^2 / (1 + w^2 theta_k^2)`` and ``G'' = sum G_k w theta_k / (1 + w^2 theta_k^2)``
@@ -245,6 +273,16 @@ def dynamic_table(
     The shift factors of several temperatures are those with which the storage moduli agree best with one positive
     series (:func:`~roughvisc.mechanics.materials.superposition.superpose`). Between the measured temperatures
     ``log a_T`` is interpolated over ``1/T``. ``material.at(temperature)`` is the material at another temperature.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import roughvisc as rv
+    >>> w = np.logspace(-1, 1, 9)  # a Maxwell fluid with the relaxation time 1 s
+    >>> storage, loss = 1e6 * w**2 / (1 + w**2), 1e6 * w / (1 + w**2)
+    >>> fluid = rv.dynamic_table(w, storage, loss, frequency_unit="rad/s", kind="shear")
+    >>> bool(abs(fluid.creep_compliance(1.0) - 2e-6) < 1e-7)
+    True
     """
     one_of("frequency_unit", frequency_unit, ("rad/s", "Hz"))
     if isinstance(shift_factors, Sequence | np.ndarray):

@@ -51,7 +51,7 @@ _EXPORTS = {
 _GWYDDION = "not verified: the reader matches the map of Gwyddion, whose first line is the top one"
 TOP_FIRST = {
     "tmd": "verified: the letters of a coin (DIME), and the maker's own script draws the first line at the top",
-    "al3d": "verified: heights and camera image of a real file lie line by line alike, and images begin at the top",
+    "al3d": "verified: heights and camera image of a real file agree line by line, and images begin at the top",
     "esri": "verified: the definition of the format, whose first row is the top one",
     "gwy": "not verified: Gwyddion's own format, whose first line is the top one",
     "opd": "not verified: two programs draw the same line at the top",
@@ -68,7 +68,8 @@ TAKEN = "not verified: rows are taken to run along x and the first to be y = 0; 
 
 def open_file(path: Path, format: str | None) -> ScanFile:
     """Read the header of a scan file; find its format by name, or else by suffix."""
-    names, failures = _formats_of(path) if format is None else (format,), list[str]()
+    names = _formats_of(path) if format is None else (format,)
+    failures = list[str]()
     for name in names:
         default = partial(binary.read_with_surface_topography, format=name)
         try:
@@ -112,6 +113,16 @@ def supported_formats() -> dict[str, Sequence[str]]:
     -------
     dict
         Name -> suffixes without the dot, in alphabetical order.
+
+    See Also
+    --------
+    roughvisc.open_scan
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> rv.supported_formats()["x3p"]
+    ('x3p',)
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -130,8 +141,8 @@ def _formats_of(path: Path) -> Sequence[str]:
         return quick
     known = supported_formats()
     wanted = "000 to 999" if len(suffix) == 3 and suffix.isdigit() else suffix
-    if found := [name for name, theirs in known.items() if wanted in theirs]:
-        return found
+    if names := [name for name, theirs in known.items() if wanted in theirs]:
+        return names
     if suffix in _EXPORTS:
         raise InputError(f"it is {_EXPORTS[suffix]}", key="format", found=path.suffix)
     listed = ", ".join(sorted({one for theirs in known.values() for one in theirs}))

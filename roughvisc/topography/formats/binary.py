@@ -75,7 +75,9 @@ def read_netcdf(path: Path) -> ScanFile:
         options: dict[str, Any] = {"engine": "scipy" if stream.read(3) == b"CDF" else "netcdf4", "decode_times": False}
     # netCDF-4 is not thread-safe, and xarray would lock only the reading
     with NETCDF4_PYTHON_LOCK, xr.open_dataset(path, lock=False, **options) as dataset:
-        channels = [_variable(str(name), one) for name, one in dataset.data_vars.items() if one.ndim >= 2]
+        channels = [
+            _variable(str(name), variable) for name, variable in dataset.data_vars.items() if variable.ndim >= 2
+        ]
     return ScanFile("nc", channels)
 
 
@@ -132,7 +134,7 @@ def read_with_surface_topography(source: Path | BytesIO | StringIO, format: str)
         raise InputError(key="format", found=format, expected="a key of supported_formats")
     reader = lookup_reader_by_format[format](str(source) if isinstance(source, Path) else source)
     default = getattr(reader, "_default_channel_index", None)
-    return ScanFile(format, [_channel(found) for found in reader.channels], default, close=reader.close)
+    return ScanFile(format, [_channel(channel) for channel in reader.channels], default, close=reader.close)
 
 
 def _channel(found: Any) -> Channel:
@@ -156,7 +158,9 @@ def _channel(found: Any) -> Channel:
         sides = (float(sizes[0]) / shape[0], float(sizes[1]) / shape[1])
         header = found.info.get("raw_metadata")
         if found.unit is None and isinstance(header, dict):  # the header may state the units of x and y alone
-            lateral, other = (header.get(f"{one}unit") or header.get(f"{two}unit") for one, two in ("xy", "yx"))
+            lateral, other = (
+                header.get(f"{axis}unit") or header.get(f"{other_axis}unit") for axis, other_axis in ("xy", "yx")
+            )
             if lateral is not None and other != lateral:
                 sides = (sides[0], sides[1] * number(f"1 {other}", lateral))
     return Channel(str(found.channel_id), load, found.unit, lateral, sides)

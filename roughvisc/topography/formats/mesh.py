@@ -20,7 +20,8 @@ _TYPES |= {"float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": 
 _TYPES |= {"int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8"}
 _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
 #: Largest number of pairs of a triangle and a cell that are tested together, and rounding of a corner on a centre.
-_PAIRS, _ON_EDGE = 1_000_000, 1e-9
+_PAIRS = 1_000_000
+_ON_EDGE = 1e-9
 
 
 def read_stl(path: Path) -> ScanFile:
@@ -30,12 +31,12 @@ def read_stl(path: Path) -> ScanFile:
     if len(content) == 84 + count * _TRIANGLE.itemsize:
         corners = np.frombuffer(content, _TRIANGLE, count, 84)["corners"].astype(float)
     else:
-        found = _VERTEX.findall(content)
-        if not content.lstrip().startswith(b"solid") or len(found) % 3 or b"endsolid" not in content:
+        vertices = _VERTEX.findall(content)
+        if not content.lstrip().startswith(b"solid") or len(vertices) % 3 or b"endsolid" not in content:
             raise InputError(
-                "it is no whole STL file: expected a binary or a text STL file", key="format", found=path.suffix
+                "it is not a complete STL file: expected a binary or a text STL file", key="format", found=path.suffix
             )
-        corners = np.array(found, dtype=float).reshape(-1, 3, 3)
+        corners = np.array(vertices, dtype=float).reshape(-1, 3, 3)
     return _mesh("stl", corners)
 
 
@@ -61,12 +62,13 @@ def read_ply(path: Path) -> ScanFile:
         kind = _record(properties, ">" if notation == "binary_big_endian" else "<")
         if notation == "ascii":
             width = sum(int(np.prod(kind[field].shape)) for field in kind.names or ())
-            part = numbers[position : position + count * width].reshape(count, width)
+            block = numbers[position : position + count * width].reshape(count, width)
             position += count * width
             rows[name] = {}
             for field in kind.names or ():
                 size = int(np.prod(kind[field].shape))
-                rows[name][field], part = np.squeeze(part[:, :size]), part[:, size:]
+                rows[name][field] = np.squeeze(block[:, :size])
+                block = block[:, size:]
         else:
             table = np.frombuffer(body, kind, count, position)
             position += count * kind.itemsize
@@ -109,9 +111,9 @@ def heights_above(corners: np.ndarray, side: float) -> np.ndarray:
     """
     low = corners[..., :2].min(axis=(0, 1))
     shape = np.floor((corners[..., :2].max(axis=(0, 1)) - low) / side * (1 + _ON_EDGE)).astype(int)
-    at = (corners[..., :2] - low) / side - 0.5  # in cells, with the centres at whole numbers
-    first = np.clip(np.ceil(at.min(axis=1) - _ON_EDGE).astype(int), 0, shape)
-    last = np.clip(np.floor(at.max(axis=1) + _ON_EDGE).astype(int), -1, shape - 1)
+    in_cells = (corners[..., :2] - low) / side - 0.5  # in cells, with the centres at whole numbers
+    first = np.clip(np.ceil(in_cells.min(axis=1) - _ON_EDGE).astype(int), 0, shape)
+    last = np.clip(np.floor(in_cells.max(axis=1) + _ON_EDGE).astype(int), -1, shape - 1)
     size = np.maximum(last - first + 1, 0)
     counts = size[:, 0] * size[:, 1]
     heights = np.full(shape[0] * shape[1], -np.inf)
@@ -122,7 +124,7 @@ def heights_above(corners: np.ndarray, side: float) -> np.ndarray:
         number = np.arange(triangle.size) - np.repeat(np.cumsum(counts[chosen]) - counts[chosen], counts[chosen])
         i = first[triangle, 0] + number // size[triangle, 1]
         j = first[triangle, 1] + number % size[triangle, 1]
-        a, b, c = np.moveaxis(at[triangle], 1, 0)
+        a, b, c = np.moveaxis(in_cells[triangle], 1, 0)
         area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
         with np.errstate(divide="ignore", invalid="ignore"):  # a vertical triangle has no area
             of_b = ((i - a[:, 0]) * (c[:, 1] - a[:, 1]) - (j - a[:, 1]) * (c[:, 0] - a[:, 0])) / area

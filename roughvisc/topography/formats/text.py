@@ -46,7 +46,7 @@ _MISSING = dict.fromkeys(("", "nan", "bad", "-", "#n/a", "n/a"), "nan")
 _NUMBER = re.compile(r"[+-]?(?:\d++(?:[.,]\d*+)?|[.,]\d++)(?:e[+-]?\d++)?|nan|bad|-|(?:#?n/a)?", re.IGNORECASE)
 
 
-def read_table(text: str) -> tuple[list[str], list[int]]:
+def lines_and_rows(text: str) -> tuple[list[str], list[int]]:
     """Return the lines of a text, and the places of the rows of numbers.
 
     Values may be separated by blanks, commas, semicolons or tabs, and empty values are missing heights. The returned
@@ -109,7 +109,7 @@ def read_numbers(text: str) -> ScanFile:
 
     Three numbers on each line are points if the header does not state the size of a matrix.
     """
-    lines, rows = read_table(text)
+    lines, rows = lines_and_rows(text)
     heading = _MATRIX_HEADING.fullmatch(lines[rows[0] - 1]) if rows and rows[0] else None
     if heading and is_quantity(f"1 {heading[1]}", "m"):
         lines[rows[0] - 1] = f"# Value units: {heading[1]}"  # as Gwyddion writes it
@@ -150,7 +150,8 @@ def _matrix(channel: Channel, complaints: list[str]) -> Channel:
     spacing = channel.spacing
     taken = "an index"
     if row and column and not is_index:
-        spacing, taken = spacing or (abs(row), abs(column)), "coordinates"
+        spacing = spacing or (abs(row), abs(column))
+        taken = "coordinates"
     complaints.append(f"the numbers of its first {removed} are in equal steps: taken as {taken}, not as heights")
     return replace(channel, load=lambda: z.T, spacing=spacing)
 
@@ -190,7 +191,8 @@ def read_zygo(text: str) -> ScanFile:
         phases = [np.array(section.split(), dtype=float) for section in sections]
         (counts,) = [phase for phase in phases if phase.size == columns * rows][-1:]
         heights = np.where(counts < _MISSING_COUNT, counts * (wave / _COUNTS[int(lines[10].split()[0])]), np.nan)
-        unit, heights = "m", heights.reshape(rows, columns).T
+        unit = "m"
+        heights = heights.reshape(rows, columns).T
     return single_map("zygo", heights, unit, "m", (side, side) if side > 0 else None)
 
 
@@ -226,7 +228,7 @@ def read_esri(text: str) -> ScanFile:
 
 def read_keyence(text: str) -> ScanFile:
     """Read the CSV of a Keyence microscope: unit and spacing from its heading, blank cells are missing points."""
-    lines, rows = read_table(text)
+    lines, rows = lines_and_rows(text)
     heights = numbers(lines, rows).T
     heading = text.splitlines()[: rows[0]]
     stated = {row[0]: row[1:] for row in csv.reader(heading, delimiter=max(";,", key="".join(heading).count)) if row}
