@@ -35,7 +35,9 @@ Boundary = Literal["free", "periodic", "mirror"]
 
 #: Number of rows in a block of rows; bytes of a block of columns, and its least number of columns. A block is
 #: transformed at once and fits in the cache: whole fields take up to 1.5 times as long (measured, 64 to 1,024 squared).
-ROWS, COLUMN_BYTES, COLUMNS = 128, 1 << 18, 32
+ROWS = 128
+COLUMN_BYTES = 1 << 18
+COLUMNS = 32
 #: Cells of a field from which blocks are transformed on several threads, and periodic fields in blocks at all: each
 #: block has the same bits on any number of threads. Measured: slower at 512 squared, faster at 1024.
 THREADED_FROM = 1024**2
@@ -146,11 +148,17 @@ class Grid:
         symbol: Array | None = None,
         xp: Any = np,
     ) -> None:
-        self.shape, self.spacing, self.boundary, self.kernel, self.xp = shape, spacing, boundary, kernel, xp
+        self.shape = shape
+        self.spacing = spacing
+        self.boundary = boundary
+        self.kernel = kernel
+        self.xp = xp
         images = 2 if boundary == "mirror" else 1
         self.period = images * shape[0], images * shape[1]
-        self.size, self.cell_area = shape[0] * shape[1], spacing[0] * spacing[1]
-        self.points, fast = shape, scipy.fft.next_fast_len
+        self.size = shape[0] * shape[1]
+        self.cell_area = spacing[0] * spacing[1]
+        self.points = shape
+        fast = scipy.fft.next_fast_len
         if boundary == "free":
             self.points = 2 * fast(shape[0], real=True), 2 * fast(shape[1], real=True)
         self.symbol = xp.asarray(self.symbol_of(kernel) if symbol is None else symbol)
@@ -160,7 +168,8 @@ class Grid:
         twice = (boundary != "mirror") & (number > 0) & (2 * number < self.points[1])
         self.self_influence = float((self.symbol.sum(axis=0) * xp.asarray(1.0 + twice)).sum()) / math.prod(self.points)
         self.convolutions = 0
-        self._transforms, self._block_transforms = transforms(self.size, xp), transforms(xp=xp)
+        self._transforms = transforms(self.size, xp)
+        self._block_transforms = transforms(xp=xp)
         #: Work array that all convolutions reuse. At 2,048 squared a new array for each would take up to a third of the
         #: processor time.
         self._work: Array | None = None
@@ -177,7 +186,9 @@ class Grid:
 
     def on(self, shape: tuple[int, int]) -> Grid:
         """Return a grid of the same body, boundary and extent with another number of cells."""
-        (nx, ny), (mx, my), (dx, dy) = self.shape, shape, self.spacing
+        (nx, ny) = self.shape
+        (mx, my) = shape
+        (dx, dy) = self.spacing
         return Grid(shape, (dx * (nx / mx), dy * (ny / my)), self.boundary, kernel=self.kernel, xp=self.xp)
 
     @cached_property
@@ -252,21 +263,27 @@ class Grid:
             spectrum *= symbol
             return fft.waves_back(spectrum, points)
         # Zeros are not transformed along y. Blocks of rows and of columns stay in the cache, each on one thread.
-        (nx, ny), count, fft, threads = self.shape, points[1] // 2 + 1, self._block_transforms, self._transforms.threads
+        (nx, ny) = self.shape
+        count = points[1] // 2 + 1
+        fft = self._block_transforms
+        threads = self._transforms.threads
         if self._work is None:
             self._work = self.xp.empty(nx * (self.points[1] // 2 + 1), np.complex128)
         spectrum = self._work.view(np.result_type(field.dtype, np.complex64))[: nx * count].reshape(nx, count)
         found = self.xp.empty((nx, ny), field.dtype)
-        rows, columns = ROWS, max(COLUMN_BYTES // (points[0] * spectrum.itemsize), COLUMNS)
+        rows = ROWS
+        columns = max(COLUMN_BYTES // (points[0] * spectrum.itemsize), COLUMNS)
         if self.xp is not np:
-            rows, columns = nx, count
+            rows = nx
+            columns = count
 
         def transform_rows(part: slice) -> None:
             spectrum[part] = fft.waves(field[part], points[1:], axes=(1,))
 
         def convolve_columns(part: slice) -> None:
             waves = self.xp.empty((points[0], spectrum[:1, part].size), spectrum.dtype)
-            waves[:nx], waves[nx:] = spectrum[:, part], 0
+            waves[:nx] = spectrum[:, part]
+            waves[nx:] = 0
             waves = fft.columns(waves)
             waves *= symbol[:, part]
             spectrum[:, part] = fft.columns(waves, back=True)[:nx]
@@ -380,7 +397,8 @@ class DuccTransforms(Transforms):
     def waves(self, field: Array, points: tuple[int, ...] | None = None, axes: tuple[int, ...] = (0, 1)) -> Array:
         if points is not None:
             longer = np.empty((len(field), points[0] + APART), field.dtype)[:, : points[0]]
-            longer[:, : field.shape[1]], longer[:, field.shape[1] :] = field, 0
+            longer[:, : field.shape[1]] = field
+            longer[:, field.shape[1] :] = 0
             field = longer
         return self.fft.r2c(field, axes=axes, **self.settings)
 
@@ -416,7 +434,8 @@ def convolved_by_cufft(fft: Any, field: Array, symbol: Array) -> Array:
 
 
 #: Directions of cuFFT.
-_FORWARD, _BACK = -1, 1
+_FORWARD = -1
+_BACK = 1
 
 
 @lru_cache(maxsize=16)

@@ -10,7 +10,8 @@ FROM_HEAP = 32 << 20
 #: Free memory at the end of the heap above which glibc returns some to the system: the largest value. [byte]
 _RETURNED_ABOVE = 2**31 - 1
 #: Numbers of both settings in malloc.h.
-_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3
+_M_TRIM_THRESHOLD = -1
+_M_MMAP_THRESHOLD = -3
 
 
 def keep_freed_memory() -> None:

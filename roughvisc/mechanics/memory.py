@@ -140,10 +140,13 @@ class Memory:
         #: Rates at which errors of the history decay while the displacement is held [1/s], and their parts in an error
         #: that is equal in all modes. The modes decay together, because ``glassy v = -sum_i c_i m_i``.
         #: Then the parts of the relaxation function that relax at these rates.
-        self.rates, self.parts, self.relaxing = np.zeros(1), np.ones(1), np.zeros(1)
+        self.rates = np.zeros(1)
+        self.parts = np.ones(1)
+        self.relaxing = np.zeros(1)
         if self.glassy > 0 and not self.is_elastic:
             active = self.compliances > 0
-            own, weights = 1 / self.times[active], self.compliances[active] / self.glassy
+            own = 1 / self.times[active]
+            weights = self.compliances[active] / self.glassy
             driven = np.where(own > 0, own, 1.0)
             equal = np.where(own > 0, 1.0, 1 / weights)  # of the fluidity: what relaxes at the rate fluidity / glassy
             # eigenvalues of diag(own) + driven weights^T, which this scaling makes symmetric
@@ -154,9 +157,12 @@ class Memory:
             self.relaxing = (root @ basis) ** 2 / np.maximum(rates, 1e-300)
         #: Number of fields of a history.
         self.field_count = 2 if keeps_pressure else 1
-        self.series_error, self.misfit, count = 0.0, 0.0, len(series.times)
+        self.series_error = 0.0
+        self.misfit = 0.0
+        count = len(series.times)
         #: Shortest age at which the error of the series is known [s], and error below it, see :func:`early_error`.
-        self.shortest, self.early = 0.0, 0.0
+        self.shortest = 0.0
+        self.early = 0.0
         terms = [f"{count} exponential{'s' * (count > 1)}"] * (count > 0) + ["a fluidity"] * (series.fluidity > 0)
         self.note = " and ".join(terms) or "no memory: elastic"
         self.may_ring = self.grows(duration, STIFF)
@@ -167,7 +173,8 @@ class Memory:
 
     def start(self, nothing: Array) -> History:
         """Return the memory of a body at rest, from an array of zeros, shape (nx, ny)."""
-        xp, shape = namespace(nothing), (self.field_count, *nothing.shape)
+        xp = namespace(nothing)
+        shape = (self.field_count, *nothing.shape)
         return History(xp.zeros(shape, nothing.dtype), xp.zeros((self.times.size, *shape), nothing.dtype))
 
     def predict(self, history: History, step: float, rule: Rule | None = None) -> Prediction:
@@ -179,7 +186,8 @@ class Memory:
             rule = ("bdf2" if follows else "constant") if rings else "linear"
         own, earlier, before, new = self.recursion(step, history.step, rule)
         xp = namespace(history.modes)
-        modes, carried = xp.empty_like(history.modes), xp.zeros_like(history.fields[0])
+        modes = xp.empty_like(history.modes)
+        carried = xp.zeros_like(history.fields[0])
         for i, mode in enumerate(modes):
             xp.multiply(history.modes[i], own[i], out=mode)
             if earlier[i] and history.earlier is not None:
@@ -224,7 +232,8 @@ class Memory:
         array, shape (k, nx, ny)
             Displacement [m], and pressure times a compliance [-].
         """
-        total, parts = self.weights[-1] * history.fields, np.broadcast_to(left, self.times.shape)
+        total = self.weights[-1] * history.fields
+        parts = np.broadcast_to(left, self.times.shape)
         for weight, part, mode in zip(self.weights[:-1], parts, history.modes, strict=True):
             if part:
                 total += weight * (mode if part == 1 else part * mode)
@@ -236,7 +245,8 @@ class Memory:
 
     def roll(self, history: History, cells: int, axis: int) -> History:
         """Return the memory of a periodic body, in the frame of a profile that has moved along an axis."""
-        fields, modes = self.rolled(history.fields, cells, axis), self.rolled(history.modes, cells, axis)
+        fields = self.rolled(history.fields, cells, axis)
+        modes = self.rolled(history.modes, cells, axis)
         earlier = None if history.earlier is None else self.rolled(history.earlier, cells, axis)
         return History(fields, modes, earlier, history.step)
 
@@ -254,7 +264,8 @@ class Memory:
         if not self.grows(longest, factor):
             return longest
         rate = float((self.compliances / np.where(np.isinf(self.times), 1.0, self.times)).sum())
-        low, high = (factor - 1) * self.glassy / rate, longest  # the compliance is concave
+        low = (factor - 1) * self.glassy / rate  # the compliance is concave
+        high = longest
         while high > 1.05 * low:
             middle = math.sqrt(low * high)
             low, high = (low, middle) if self.grows(middle, factor) else (middle, high)
@@ -309,7 +320,9 @@ class Memory:
         -------
         own, earlier, before, new : ndarray, shape (m,)
         """
-        ratio, flows, none = step / self.times, np.isinf(self.times), np.zeros(self.times.size)
+        ratio = step / self.times
+        flows = np.isinf(self.times)
+        none = np.zeros(self.times.size)
         if rule == "linear":
             before, after = parts_of_step(ratio)
             return np.exp(-ratio), none, np.where(flows, step / 2, before), np.where(flows, step / 2, after)
@@ -318,7 +331,8 @@ class Memory:
         growth = step / last
         beta = (1 + growth) / (1 + 2 * growth)
         divisor = 1 + beta * ratio
-        own, earlier = (1 + growth) ** 2 / (1 + 2 * growth) / divisor, -(growth**2) / (1 + 2 * growth) / divisor
+        own = (1 + growth) ** 2 / (1 + 2 * growth) / divisor
+        earlier = -(growth**2) / (1 + 2 * growth) / divisor
         return own, earlier, none, beta * np.where(flows, step, ratio) / divisor
 
 
@@ -349,8 +363,11 @@ class LayerMemory(Memory):
     def __init__(self, waves: LayerSeries, duration: float, grid: Grid | None) -> None:
         limits = (waves.q[0], waves.q[-1]) if grid is None else wave_limits(grid.period, grid.spacing)
         super().__init__(waves.fastest_wave(*limits), duration)
-        self.rates, self.parts, self.relaxing = np.zeros(1), np.ones(1), np.zeros(1)  # a common rate does not exist
-        self.waves, self.grid = waves, cast(Grid, grid)
+        self.rates = np.zeros(1)  # a common rate does not exist
+        self.parts = np.ones(1)
+        self.relaxing = np.zeros(1)
+        self.waves = waves
+        self.grid = cast(Grid, grid)
         if grid is not None:
             #: Symbol of each exponential [m/Pa], of the fluidity [m/(Pa s)], and of the instantaneous response. [m/Pa]
             alone = np.eye(len(waves.compliances))
@@ -362,9 +379,11 @@ class LayerMemory(Memory):
 
     def predict(self, history: History, step: float, rule: Rule | None = None) -> Prediction:
         """Return the elastic problem of a step [s], with its kernel; its compliance is one, or zero if it is rigid."""
-        found, (*symbols, at_once) = super().predict(history, step, rule), self.weights
+        found = super().predict(history, step, rule)
+        (*symbols, at_once) = self.weights
         symbol = sum((part * one for part, one in zip(found.new, symbols, strict=True) if part), at_once)
-        cells, kernel = self.grid, self.waves.kernel(np.append(found.new, 1.0))
+        cells = self.grid
+        kernel = self.waves.kernel(np.append(found.new, 1.0))
         grid = Grid(cells.shape, cells.spacing, cells.boundary, kernel=kernel, symbol=symbol, xp=cells.xp)
         return replace(found, compliance=float(symbol.any()), carried=cells.field_of(found.carried), grid=grid)
 
@@ -417,7 +436,8 @@ def choose_memory(
     else:
         found, error = _series(body.material, shortest, duration, share)
         memory = Memory(found, duration, keeps_pressure)
-        memory.series_error, memory.misfit = error, body.material.misfit * (duration > 0)
+        memory.series_error = error
+        memory.misfit = body.material.misfit * (duration > 0)
         if error > 0 and duration > 0:
             memory.shortest = shortest
             known = getattr(body.material, "replaces", None)
@@ -457,12 +477,14 @@ def _of_layers(body: LayeredBody, duration: float, share: float, shortest: float
     # the series of the waves need not be much more accurate than those of the materials
     waves = layer_series(body.of(found), shortest, duration, max(share - max(errors), SERIES_SHARE * max(errors)))
     memory = LayerMemory(waves, duration, grid)
-    memory.series_error, memory.misfit = waves.error + max(errors), max(one.misfit for one in given)
+    memory.series_error = waves.error + max(errors)
+    memory.misfit = max(one.misfit for one in given)
     if duration > 0:
         memory.shortest = shortest
         pairs = zip(given, found, errors, strict=True)
         of_materials = (early_error(a.creep_compliance, b.creep_compliance, shortest) for a, b, error in pairs if error)
-        few, bodies = waves.q[:: max(waves.q.size // 20, 1)], body.of(found)
+        few = waves.q[:: max(waves.q.size // 20, 1)]
+        bodies = body.of(found)
         course = interpolated(few, waves.q, waves.compliances)
         of_waves = early_error(lambda t: bodies.creep(few, t), lambda t: (crept(waves.times, t) @ course).T, shortest)
         memory.early = max(of_materials, default=0.0) + of_waves

@@ -115,7 +115,8 @@ class Segment:
 
     def __str__(self) -> str:
         """Return the segment in words, such as ``load to 2 N over 50 ms``."""
-        lasting, unit = format_quantity(self.duration, "s"), UNITS[self.control]
+        lasting = format_quantity(self.duration, "s")
+        unit = UNITS[self.control]
         named = "nominal pressure" if self.control == "pressure" else self.control
         if self.amplitude:
             wave = f"{format_quantity(self.end or 0.0, unit)} ± {format_quantity(self.amplitude, unit)}"
@@ -486,7 +487,8 @@ class Program:
         Program
             The same program if it prescribes no nominal pressure.
         """
-        size, segments = number(area, "m^2", "area", above=0), []
+        size = number(area, "m^2", "area", above=0)
+        segments = []
         for one in self.segments:
             if one.control == "pressure":
                 end = None if one.end is None else float(f"{one.end * size:.15g}")
@@ -525,7 +527,8 @@ class Program:
         start : float
             Value at the start of the segment. [N or m]
         """
-        segment, elapsed = self.segments[number], time - self.corners[number]
+        segment = self.segments[number]
+        elapsed = time - self.corners[number]
         end = start if segment.end is None else segment.end
         if segment.amplitude:
             return end + segment.amplitude * math.sin(2 * math.pi * elapsed / segment.period)
@@ -536,7 +539,8 @@ class Program:
     @cached_property
     def prescribes(self) -> list[bool]:
         """Whether the program prescribes the value of each segment; a hold may keep a computed value instead."""
-        found, control = list[bool](), self.segments[0].control if self.segments else "load"
+        found = list[bool]()
+        control = self.segments[0].control if self.segments else "load"
         for segment in self.segments:
             is_prescribed = segment.end is not None or (segment.control == control and (not found or found[-1]))
             control = segment.control
@@ -565,13 +569,16 @@ class Program:
         A jump counts as long as the segment after it: it represents a change that is fast for the material, but slow
         for elastic waves. A ramp from a computed value counts from zero.
         """
-        sizes, before = dict.fromkeys(UNITS, 0.0), dict.fromkeys(UNITS, 0.0)
+        sizes = dict.fromkeys(UNITS, 0.0)
+        before = dict.fromkeys(UNITS, 0.0)
         for one in self.segments:
             sizes[one.control] = max(sizes[one.control], abs(one.end or 0.0) + abs(one.amplitude))
-        scales, jumped = [math.inf], False
+        scales = [math.inf]
+        jumped = False
         for one in self.segments:
             end = before[one.control] if one.end is None else one.end
-            change, before[one.control] = abs(end - before[one.control]), end
+            change = abs(end - before[one.control])
+            before[one.control] = end
             if one.duration > 0:
                 rate = change / one.duration + 2 * math.pi * abs(one.amplitude) / one.period
                 scales += [sizes[one.control] / rate] if rate > 0 else []

@@ -105,7 +105,8 @@ class Scene:
         self.can_jump = self.memory.compliance(0.0) > 0
         self.is_soft = self.memory.grows(self.program.duration, SOFT)
         self.corners = corners_of(self.program, self.can_jump)
-        motion, self.motions = None, []
+        motion = None
+        self.motions = []
         for segment in reversed(self.program.segments):
             motion = segment.slide or motion
         for segment in self.program.segments:

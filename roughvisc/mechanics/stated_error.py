@@ -30,7 +30,8 @@ from roughvisc.mechanics.tangential import tangential_force
 #: and of the approach. The difference is three times the error at second order and the error at first order. Measured
 #: on workflows/benchmarks/accuracy.py. Then the same for bodies with hardly any instantaneous compliance, whose first
 #: steps are of first order.
-STATED, STATED_SOFT = (0.6, 0.6), (1.0, 1.5)
+STATED = (0.6, 0.6)
+STATED_SOFT = (1.0, 1.5)
 #: Least stated error after a pair, over the part of the error before the pair that relaxation leaves.
 LASTING = 0.5
 #: Uncertain part of the pressure of a cell that has just entered the contact, if the pressure is due to creep.
@@ -136,8 +137,10 @@ def difference(
     """
     if fine is coarse:
         return Difference()
-    grid, (stated, of_approach) = scene.grid, stated_parts(scene)
-    pressure, other = fine.pressure, coarse.pressure
+    grid = scene.grid
+    (stated, of_approach) = stated_parts(scene)
+    pressure = fine.pressure
+    other = coarse.pressure
     error = Difference(
         pressure=stated * (float(abs(pressure - other).sum()) * grid.cell_area),
         force=stated * abs(fine.force - coarse.force),
@@ -150,13 +153,15 @@ def difference(
         return error
     gap = scene.gap + scene.memory.displacement(fine.history)[0] - fine.approach
     gap_of_coarse = scene.gap + scene.memory.displacement(coarse.history)[0] - coarse.approach
-    pressure, other = scene.contact_pressure(fine, pressure), scene.contact_pressure(coarse, other)
+    pressure = scene.contact_pressure(fine, pressure)
+    other = scene.contact_pressure(coarse, other)
     contact = fine.contact
     inside = contact & (pressure <= abs(pressure - other))
     outside = ~contact & (coarse.contact | (gap <= abs(gap - gap_of_coarse)))
     if scene.present is not None:
         outside &= scene.present
-    cells, uncertain = int(contact.sum()), 0.0
+    cells = int(contact.sum())
+    uncertain = 0.0
     if cells and scene.memory.grows(fine.time - before.time, SOFT):
         uncertain = entering(scene, before, fine) + ENTERING * float(outside.sum()) * fine.size / cells
     return replace(
@@ -202,7 +207,8 @@ def left_of_friction(scene: Scene, before: Point, after: Point, slide: Slide) ->
     """
     if scene.memory.is_elastic:
         return 0.0, 0.0
-    former, present = friction(scene, before, slide), friction(scene, after, slide)
+    former = friction(scene, before, slide)
+    present = friction(scene, after, slide)
     left = min(abs(present / former), 1.0) if former else 0.0
     if isinstance(scene.memory, LayerMemory):  # the rates depend on the wave
         return left, 0.0
@@ -219,7 +225,9 @@ def phase_error(scene: Scene, point: Point, slide: Slide, step: float) -> float:
     """
     if scene.memory.is_elastic or point.is_open:
         return 0.0
-    fft, axis, count = fft_of(scene.grid.xp), slide.axis, point.pressure.shape[slide.axis]
+    fft = fft_of(scene.grid.xp)
+    axis = slide.axis
+    count = point.pressure.shape[slide.axis]
     spectra = [fft.rfft(field, axis=axis) for field in (point.pressure, scene.memory.displacement(point.history)[0])]
     wave = scene.grid.xp.arange(1, (count + 1) // 2)
     phase = 2 * math.pi / count * wave
@@ -298,7 +306,8 @@ def work_of_pair(
     def parameter(point: Point) -> float:
         return point.time - start.time if is_over_time else touch(scene, point) - float(begin[1])
 
-    early, last = parameter(first), parameter(end)
+    early = parameter(first)
+    last = parameter(end)
     is_curved = not first.is_open and LEAST_PART * last**2 < early * last < (1 - LEAST_PART) * last**2
     if is_curved:
         bends = (changes[1] / last - changes[0] / early) / (last - early)
@@ -318,9 +327,13 @@ def work_of_pair(
     arches = curved[0] - straight[0], curved[1] - curved[0] - straight[1] + straight[0]
     works = []
     for point in inside:  # the straight line to the point itself, and its part of the arch above the step
-        ends, known, arch = (start, first), 0.0, arches[0]
+        ends = (start, first)
+        known = 0.0
+        arch = arches[0]
         if point.time > first.time:
-            ends, known, arch = (first, end), curved[0], arches[1]
+            ends = (first, end)
+            known = curved[0]
+            arch = arches[1]
         part = (point.time - ends[0].time) / (ends[1].time - ends[0].time)
         works.append(known + work_of_step(scene, ends[0], point) + part**3 * arch)
     works.append(curved[1])
@@ -352,8 +365,10 @@ def transient_error(scene: Scene, start: Point, first: Point, end: Point, *, by_
     """
     if first.is_open or end.is_open:
         return 0.0
-    early, last = first.time - start.time, end.time - start.time
-    memory, is_stiff = scene.memory, scene.memory.may_ring and scene.memory.grows(early, STIFF)
+    early = first.time - start.time
+    last = end.time - start.time
+    memory = scene.memory
+    is_stiff = scene.memory.may_ring and scene.memory.grows(early, STIFF)
     if not by_load:
         part = part_relaxed(memory, early) if is_stiff else part_missed(memory, early, last)
         return 2 * part * abs(first.force - start.force) * abs(end.approach - touch(scene, start))

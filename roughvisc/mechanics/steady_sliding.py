@@ -361,7 +361,8 @@ class _NewtonSystem:
         while True:
             solution, count = gmres(multiply, scaled, enough)
             change = self._precondition(solution)
-            step, vectors = change if step is None else step + change, vectors + count
+            step = change if step is None else step + change
+            vectors = vectors + count
             right = right - self._product(change)
             scaled = self._scaled(right)
             before = norm

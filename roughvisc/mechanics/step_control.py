@@ -25,14 +25,16 @@ RESOLVED = 1.5
 #: Part of the tolerance that a pair may add to the error: usually, and for bodies with hardly any instantaneous
 #: compliance. With 0.4, one in eight cases of such bodies has a row beyond the tolerance. With 0.2 a third to a half of
 #: these cases are within it, for 1.1 times the convolutions; with 0.1 three in five, for 1.26 times (`accuracy.py`).
-ALLOWED, ALLOWED_SOFT = 0.25, 0.17
+ALLOWED = 0.25
+ALLOWED_SOFT = 0.17
 #: Order of the error of a pair in its length, observed: cells enter and leave the contact within steps. With 2: 1.00,
 #: 0.99, 0.94, and 20 and 17 rows beyond instead of 19 and 14.
 ORDER = 1.5
 #: Ratio of the lengths of successive pairs: smallest and largest. If the memory uses BDF2, a pair that ends later
 #: than planned must not grow by more than LARGEST_GROWTH. At least 0.5: 1.03, 1.01, 0.94, and 24 and 17 rows beyond
 #: instead of 19 and 14. At most 2.3: 1.01, 1.00, 1.00. At most 3.5 with BDF2 too: 2.0, 1.4, 1.3.
-SHRINK, GROW = 0.3, 3.5
+SHRINK = 0.3
+GROW = 3.5
 #: Least part of an error that counts as remaining after relaxation, because other errors do not fade. With
 #: zero `closed_forms.py work-approach --seed 778` has 43 rows of 813 beyond the tolerance instead of 33.
 LEAST_REMAINING = 0.02
@@ -145,7 +147,8 @@ def first_length(scene: Scene, segment: Segment, jumped: bool) -> float:
 
 def shortest_length(scene: Scene, number: int) -> float:
     """Return the shortest length of a pair in a segment. [s]"""
-    segment, began = scene.program.segments[number], scene.program.corners[number]
+    segment = scene.program.segments[number]
+    began = scene.program.corners[number]
     return SHORTEST_PAIR * min(segment.duration, scene.next_kept(began) - began)
 
 
@@ -156,7 +159,8 @@ def pair_ends(scene: Scene, number: int, now: float, length: float, *, is_first:
     the latest, because a fast relaxation in it may be over at its end. If `scene.time_step` is fixed, steps are at most
     that long, and kept times are the middle or the end of pairs.
     """
-    segment, (began, end) = scene.program.segments[number], scene.program.corners[number : number + 2]
+    segment = scene.program.segments[number]
+    (began, end) = scene.program.corners[number : number + 2]
     if scene.time_step is not None:
         longest = scene.time_step * (1 + ROUNDED)  # up to rounding
         event = min(scene.next_kept(now), end)
@@ -212,12 +216,15 @@ def errors_over_allowed(
     lands : bool
         Whether the pair contains a kept row.
     """
-    second, taken, memory = pair.second, pair.length, scene.memory
+    second = pair.second
+    taken = pair.length
+    memory = scene.memory
     force = max(largest[0], pair.first.size, second.size, scene.least_force)
     rounding = ROUNDING * memory.compliance(second.time) * scene.grid.largest_eigenvalue * force / scene.gap.size
     approach = max(largest[1], abs(pair.first.approach), abs(second.approach), rounding / scene.grid.cell_area, 1e-300)
 
-    row, (stated, of_approach) = 0.0, stated_parts(scene)
+    row = 0.0
+    (stated, of_approach) = stated_parts(scene)
     if lands and scene.keeps(second.time) and taken > FIRST_PAIR * (second.time - scene.program.corners[number]):
         of_pressure = max(error.pressure / stated, error.pressure + shared) / force
         row = max(of_pressure, error.approach / of_approach / approach) / scene.tolerance
@@ -252,8 +259,12 @@ def added(scene: Scene, pair: Pair, number: int, following: float, scales: tuple
     scales : tuple of float
         Force and approach to which errors are relative. [N, m]
     """
-    memory, second, once, taken = scene.memory, pair.second, pair.once, pair.length
-    is_soft, by_load = pair.is_soft, scene.program.segments[number].control == "load"
+    memory = scene.memory
+    second = pair.second
+    once = pair.once
+    taken = pair.length
+    is_soft = pair.is_soft
+    by_load = scene.program.segments[number].control == "load"
     receding = pair.receding()
     at_end = second.pressure - once.pressure
     at_start = pair.start.pressure - pair.coarse_start.pressure
@@ -263,9 +274,11 @@ def added(scene: Scene, pair: Pair, number: int, following: float, scales: tuple
         remains = 1.0 if receding else remains
     else:
         change = min(change, float(abs(at_end - memory.remaining(taken) * at_start).sum()))
-        ahead, left = following - second.time, 1.0
+        ahead = following - second.time
+        left = 1.0
         if not by_load:  # what relaxes within the pair is no longer part of the change
-            ahead, left = following - pair.start.time, memory.remaining(taken)
+            ahead = following - pair.start.time
+            left = memory.remaining(taken)
         remains = max(memory.remaining(ahead) / left if left > 0 else 0.0, LEAST_REMAINING)
     error = change * scene.grid.cell_area / scales[0] * remains
     if by_load:

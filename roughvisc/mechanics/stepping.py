@@ -65,7 +65,8 @@ Guess = tuple[Array, Array | None]
 PACKED_FROM = 1024**2
 #: Tolerance of the contact solver over the tolerance of the run: usually, and in a slide. A step of a slow slide
 #: changes the pressure little, and the friction force is a small part of the load.
-SOLVER_PART, SLIDING_PART = 0.2, 0.06
+SOLVER_PART = 0.2
+SLIDING_PART = 0.06
 #: Length of the additional step that gives the pressure at the end of a soft step, as a part of the soft step. Also
 #: the tolerance of the contact solver in the soft step over the tolerance of the run: the additional step magnifies the
 #: residual. Without: one row of five beyond the tolerance (`accuracy.py`); with 6e-4 no fewer (`step_constants.py`).
@@ -191,8 +192,10 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
             yield Step(state.fine, state.difference, 0, state)
     scene.grid.convolutions = state.convolutions
     while state.segment < len(segments):
-        number, segment = state.segment, segments[state.segment]
-        is_jump, is_start = segment.duration == 0, state.fine.time == 0
+        number = state.segment
+        segment = segments[state.segment]
+        is_jump = segment.duration == 0
+        is_start = state.fine.time == 0
         if not is_jump:
             slide = segment.slide
             steps = pair_of_steps(scene, state, segment) if slide is None else pair_of_cells(scene, state, slide)
@@ -225,10 +228,13 @@ def with_largest_kept(scene: Scene, state: State, steps: list[Step]) -> list[Ste
     steps : list of Step
         Accepted steps, in order.
     """
-    force, approach, counted = state.kept_force, state.kept_approach, list[Step]()
+    force = state.kept_force
+    approach = state.kept_approach
+    counted = list[Step]()
     for step in steps:
         if scene.keeps(step.point.time):
-            force, approach = max(force, step.point.size), max(approach, abs(step.point.approach))
+            force = max(force, step.point.size)
+            approach = max(approach, abs(step.point.approach))
         counted.append(step._replace(state=replace(step.state, kept_force=force, kept_approach=approach)))
     return counted
 
@@ -241,9 +247,13 @@ def next_segment(scene: Scene, state: State) -> State:
 
     Without instantaneous compliance the first step of that segment takes a jump of the load before it.
     """
-    segments, fine, index = scene.program.segments, state.fine, state.segment + 1
-    last, following = segments[index - 1], segments[min(index, len(segments) - 1)]
-    corner, load = scene.corners[index - 1], fine.force
+    segments = scene.program.segments
+    fine = state.fine
+    index = state.segment + 1
+    last = segments[index - 1]
+    following = segments[min(index, len(segments) - 1)]
+    corner = scene.corners[index - 1]
+    load = fine.force
     if last.duration == 0 and not scene.can_jump:
         value = scene.program.prescribed(state.segment, fine.time, fine.start)
         if last.control == "load":
@@ -253,7 +263,8 @@ def next_segment(scene: Scene, state: State) -> State:
                 f"at {fine.time:g} s the approach jumps to {value:g} m, and the material has no instantaneous "
                 "compliance: expected a ramp (over > 0), or a material that can jump"
             )
-    jumped, points = load != fine.force, []
+    jumped = load != fine.force
+    points = []
     for point in (fine, state.twice or fine):
         start = point.approach if following.control == "approach" else load if jumped else point.force
         is_late = jumped or (corner.is_abrupt and not point.is_open)
@@ -269,7 +280,9 @@ def without_past(point: Point) -> Point:
 
 def single_step(scene: Scene, state: State, time: float) -> Step:
     """Return one step that both solutions take: a jump, or a step without contact or without memory."""
-    fine, coarse, number = state.fine, state.twice or state.fine, state.segment
+    fine = state.fine
+    coarse = state.twice or state.fine
+    number = state.segment
     new = other = take_step(scene, fine, time, number, rule="linear")
     if coarse is not fine:
         rule: Rule | None = "linear" if coarse.is_open else None
@@ -278,7 +291,8 @@ def single_step(scene: Scene, state: State, time: float) -> Step:
     left = scene.memory.remaining(time - fine.time)
     lasting = error.at_least(state.difference, left)
     error = replace(error, shared=lasting.shared) if new.is_open else lasting
-    reached, twice = new, other
+    reached = new
+    twice = other
     if new.is_open and fine.is_open and not fine.is_late:
         reached = without_past(new)
         twice = reached if other is new else without_past(other)
@@ -289,7 +303,9 @@ def single_step(scene: Scene, state: State, time: float) -> Step:
 
 def attracted(scene: Scene, state: State) -> State:
     """Return the state at the start with adhesion: the surfaces attract each other as soon as the body can deform."""
-    segments, point, xp = scene.program.segments, state.fine, scene.grid.xp
+    segments = scene.program.segments
+    point = state.fine
+    xp = scene.grid.xp
     approach = point.approach
     if segments and segments[0].control == "approach":
         approach = scene.program.prescribed(0, 0.0, 0.0)
@@ -307,16 +323,19 @@ def attracted(scene: Scene, state: State) -> State:
 
 def step_on_path(scene: Scene, state: State, segment: Segment, event: float) -> Step:
     """Return a step of an elastic body with adhesion to an event at most [s]; the step of a jump is short."""
-    fine, is_refused = state.fine, False
+    fine = state.fine
+    is_refused = False
     longest = min(longest_step(scene, segment, fine.start), event - fine.time)
     length = min(state.next_length or longest, longest)
     while True:
         parts = max(math.ceil((event - fine.time) / length * (1 - ROUNDED)), 1)
         step = single_step(scene, state, fine.time + (event - fine.time) / parts if parts > 1 else event)
-        taken, lost = step.point.time - fine.time, dissipated(scene, fine, step.point)
+        taken = step.point.time - fine.time
+        lost = dissipated(scene, fine, step.point)
         if lost == 0 or taken <= JUMP * longest * (1 + ROUNDED):
             break
-        length, is_refused = taken / 2, True
+        length = taken / 2
+        is_refused = True
     following = 0.0 if lost > 0 else taken / 2 if is_refused else 2 * taken
     total = state.dissipated + lost
     after = replace(step.state, dissipated=total, next_length=0.0 if step.state.segment > state.segment else following)
@@ -330,7 +349,8 @@ def step_while_open(scene: Scene, state: State, closes: float) -> Step:
     is uncertain if the remaining gap is within the tolerance of the approach. The stated error is then the largest
     force.
     """
-    step, largest = single_step(scene, state, closes), state.largest_force
+    step = single_step(scene, state, closes)
+    largest = state.largest_force
     before, left = (touch(scene, point) - point.approach for point in (state.fine, step.point))
     if scene.can_jump or left >= min(before, scene.tolerance * state.largest_approach):
         return step
@@ -339,7 +359,8 @@ def step_while_open(scene: Scene, state: State, closes: float) -> Step:
 
 def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
     """Return the next accepted steps of a segment: a pair, or one step. The last step has the state after them."""
-    fine, number = state.fine, state.segment
+    fine = state.fine
+    number = state.segment
     began, end = scene.program.corners[number : number + 2]
     event = min(scene.next_kept(fine.time), end)
     if fine.is_open and not fine.is_late:
@@ -384,7 +405,9 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
 
 def solve_pair(scene: Scene, state: State, middle: float, last: float, *, has_row: bool) -> tuple[Pair, Point, Point]:
     """Return a pair of steps, and both solutions at its end with the pressures at that time if it has a kept row."""
-    fine, coarse, number = state.fine, state.twice or state.fine, state.segment
+    fine = state.fine
+    coarse = state.twice or state.fine
+    number = state.segment
     is_soft = scene.memory.grows(last - fine.time, SOFT)
     needs_pressure = has_row and is_soft
     solver_part = END_STEP if needs_pressure else SOLVER_PART
@@ -423,7 +446,10 @@ def accepted(
     next_length : float
         Length of the next pair. [s]
     """
-    fine, memory, number, former = pair.start, scene.memory, state.segment, state.difference
+    fine = pair.start
+    memory = scene.memory
+    number = state.segment
+    former = state.difference
     slide = scene.motions[number]
 
     def at_least(error: Difference, point: Point) -> Difference:
@@ -443,7 +469,8 @@ def accepted(
     inside.sort(key=lambda point: point.time)
     is_first = fine.time == scene.program.corners[number]
     works, work_error, last_error = work_of_pair(scene, fine, pair.first, pair.second, inside)
-    by_load, relaxing = scene.program.segments[number].control == "load", 0.0
+    by_load = scene.program.segments[number].control == "load"
+    relaxing = 0.0
     if is_first and not fine.is_late:
         relaxing = transient_error(scene, fine, pair.first, pair.second, by_load=by_load)
     after = after_steps(
@@ -458,7 +485,8 @@ def accepted(
         work_relaxed=state.work_relaxed + relaxing,
     )
 
-    steps, of_work = [], max(state.work_difference, after.work_difference, key=abs)
+    steps = []
+    of_work = max(state.work_difference, after.work_difference, key=abs)
     for point, work in zip(inside, works[:-1], strict=True):
         left = 1.0 if pair.is_soft else memory.remaining(point.time - fine.time)
         uncertain = entering(scene, fine, point)
@@ -495,7 +523,8 @@ def with_final_pressure(scene: Scene, before: Point, point: Point, number: int) 
     """
     if point.is_open:
         return point
-    ahead, value = END_STEP * (point.time - before.time), point.force
+    ahead = END_STEP * (point.time - before.time)
+    value = point.force
     if scene.program.segments[number].control == "approach":
         value = 2 * point.approach - scene.program.prescribed(number, point.time - ahead, point.start)
     later = take_step(scene, without_past(point), point.time + ahead, number, value, rule="constant")
@@ -525,7 +554,8 @@ def after_steps(
     **totals
         Other attributes of the new state: difference, work and its error, distance.
     """
-    fine, of_work = points[-1], 0.0
+    fine = points[-1]
+    of_work = 0.0
     if coarse is not fine:
         of_work = work_of_step(scene, state.twice or state.fine, coarse) - work_of_step(scene, state.fine, fine)
     reached = replace(
@@ -552,9 +582,13 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     The body moves backwards under the profile by whole cells, without interpolation. The step is then an elastic
     contact problem. The coarse solution moves by two cells per step. Only smaller cells reduce the error.
     """
-    grid, memory, fine, coarse = scene.grid, scene.memory, state.fine, state.twice or state.fine
+    grid = scene.grid
+    memory = scene.memory
+    fine = state.fine
+    coarse = state.twice or state.fine
     began, end = scene.program.corners[state.segment : state.segment + 2]
-    cells, side = slide.cells(grid.spacing), grid.spacing[slide.axis]
+    cells = slide.cells(grid.spacing)
+    side = grid.spacing[slide.axis]
     taken = round((fine.time - began) / (end - began) * cells)
     count = 1 if memory.is_elastic else min(2, cells - taken)
 
@@ -568,9 +602,11 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     def over(here: Point, number: int, time: float, guess: Guess) -> Point:
         return take_step(scene, body_under(here, number), time, state.segment, guess=guess, solver_part=SLIDING_PART)
 
-    points, works = [fine], [0.0]
+    points = [fine]
+    works = [0.0]
     for number in range(1, count + 1):
-        here, time = points[-1], instant(began, end, taken + number, cells)
+        here = points[-1]
+        time = instant(began, end, taken + number, cells)
         points.append(over(here, 1, time, (here.pressure, here.history.fields[0])))
         works.append(works[-1] + work_of_step(scene, here, points[-1], slides=True))
     once = last = points[-1]
@@ -590,7 +626,8 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     if cells == 1 and not memory.is_elastic:  # there is no solution with longer steps
         error = replace(error, friction=abs(friction(scene, last, slide)))
     error = replace(error, shared=shared).at_least(state.difference, relaxed)
-    step, skipped = points[1].time - fine.time, 0.0
+    step = points[1].time - fine.time
+    skipped = 0.0
     if taken == 0 and not memory.is_elastic:  # a long first step is of first order, and the next one corrects it
         change = abs(friction(scene, points[1], slide) - friction(scene, last, slide))
         skipped = skipped_friction(scene, body_under(fine, 1), points[1], slide, step)
@@ -598,7 +635,8 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     carried = max(LASTING * state.difference.friction, skipped if count == 1 else skipped * memory.remaining(step))
     of_friction = max(error.friction, carried, phase_error(scene, last, slide, step))  # each step makes a new error
     error = replace(error, friction=of_friction)
-    work, distance = state.work + works[-1], state.distance + count * side
+    work = state.work + works[-1]
+    distance = state.distance + count * side
     after = after_steps(scene, state, points[1:], once, difference=error, work=work, distance=distance)
     of_work = max(state.work_difference, after.work_difference, key=abs)
     inside = replace(state, work=state.work + works[1], work_difference=of_work, distance=state.distance + side)
@@ -647,11 +685,16 @@ def take_step(
     ConvergenceError
         If the contact solver does not converge.
     """
-    memory, step, area, segment = scene.memory, time - here.time, scene.grid.cell_area, scene.program.segments[number]
+    memory = scene.memory
+    step = time - here.time
+    area = scene.grid.cell_area
+    segment = scene.program.segments[number]
     by_load = segment.control == "load"
     value = scene.program.prescribed(number, time, here.start) if value is None else value
     prediction = memory.predict(here.history, step, "constant" if here.is_late else rule)
-    alpha, gap, grid = prediction.compliance, prediction.carried, prediction.grid or scene.grid
+    alpha = prediction.compliance
+    gap = prediction.carried
+    grid = prediction.grid or scene.grid
     gap += scene.gap
     lowest = float(gap[scene.solid].min())
     common = here.history.fields[0] if prediction.grid is None else None  # displacement per unit compliance
@@ -687,12 +730,14 @@ def take_step(
         ) from error
     if grid is not scene.grid:
         scene.grid.convolutions += grid.convolutions
-    pressure, unit = found.pressure, found.displacement
+    pressure = found.pressure
+    unit = found.displacement
     pressure /= alpha
     unit /= alpha
     force, approach = (value, found.approach) if by_load else (found.load / alpha * area, value)
     history = memory.advance(here.history, prediction, unit, pressure)
-    errors, stored = (found.error, found.approach_error), pressure
+    errors = (found.error, found.approach_error)
+    stored = pressure
     if pressure.size >= PACKED_FROM and 2 * int((pressure > 0).sum()) < pressure.size:
         cells = grid.xp.flatnonzero(pressure).astype(np.int32)
         stored = Packed(pressure.shape, cells, pressure.reshape(-1)[cells])
@@ -714,7 +759,9 @@ def with_difference(second: Point, coarse: Point, fine: Point) -> Guess:
 
 def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> float:
     """Return the time until which open surfaces stay apart; the present time if they touch immediately. [s]"""
-    here, now, began = state.fine, state.fine.time, scene.program.corners[state.segment]
+    here = state.fine
+    now = state.fine.time
+    began = scene.program.corners[state.segment]
     if segment.control == "load":
         return event if segment.highest(here.start) == 0 else now
     # the profile would not even touch the undeformed surface, which is the highest

@@ -234,7 +234,8 @@ def flow(gap: Array, spacing: tuple[float, float], *, wrap: bool = False) -> Flo
     flux = scale * faces * drop
     along = flux[: (nx + 1) * ny].reshape(nx + 1, ny)
     across = flux[(nx + 1) * ny :].reshape(nx, ny)
-    along, across = along[1:] + along[:-1], across + np.roll(across, 1, axis=1)
+    along = along[1:] + along[:-1]
+    across = across + np.roll(across, 1, axis=1)
     return Flow(conductance * scale, error * scale, along / 2 / spacing[1], across / 2 / spacing[0])
 
 
@@ -348,11 +349,14 @@ def _elimination(faces: Array, cells: Numbers, shape: tuple[int, int]) -> Callab
         weights = between[column].copy()
         own = outside[column]
         weights[column] = along[row + 1, column] if row < nx - 1 else 0.0  # the next cell of the column takes the place
-        between[column], between[:, column], outside[column] = 0.0, 0.0, 0.0
+        between[column] = 0.0
+        between[:, column] = 0.0
+        outside[column] = 0.0
         total = float(weights.sum() + own)
         if number[index] >= 0 and total > 0:
             share = weights / total
-            shares[number[index]], totals[number[index]] = share, total
+            shares[number[index]] = share
+            totals[number[index]] = total
             between += weights[:, None] * share
             outside += own * share
         if row < nx - 1:
@@ -425,7 +429,8 @@ def _solver_on_two_grids(
             length = product / power
             pressure += length * direction
             left -= length * through
-            before, energy = product, energy + length * product
+            before = product
+            energy = energy + length * product
         return pressure
 
     return solve
@@ -437,7 +442,8 @@ def _prolongation(matrix: sparse.csr_array, cells: Numbers, width: int) -> spars
     faces = sparse.triu(matrix, 1).tocoo()
     first, second = faces.coords
     strong = -faces.data > _STRONG * np.sqrt(diagonal[first] * diagonal[second])
-    first, second = first[strong], second[strong]
+    first = first[strong]
+    second = second[strong]
     along, across = np.divmod(cells, width)
     block = along // _BLOCK * width + across // _BLOCK
     inside = block[first] == block[second]
@@ -494,7 +500,9 @@ def frozen_contact(
     if boundary == "free":  # the surface outside the spots has no influence
         [(x, y)] = ndimage.find_objects(contact.astype(np.int8))
         around = slice(x.start, x.stop + 2), slice(y.start, y.stop + 2)
-        contact, rimmed, rim = contact[x, y], rimmed[around], rim[around]
+        contact = contact[x, y]
+        rimmed = rimmed[around]
+        rim = rim[around]
     stiffness, off, pressure = _punch(contact, spacing, boundary, tolerance)
     ends, opens, scatter = _edge_energies(rimmed, rim, pressure, spacing)
     # the faces of mirror images have equal errors

@@ -585,8 +585,10 @@ def neighbours(mask: Array, boundary: Boundary, outside: bool = False) -> Iterat
     for own in (mask, mask.T):
         lower = np.empty_like(own)
         upper = np.empty_like(own)
-        lower[1:], lower[0] = own[:-1], {"free": outside, "periodic": own[-1], "mirror": own[0]}[boundary]
-        upper[:-1], upper[-1] = own[1:], {"free": outside, "periodic": own[0], "mirror": own[-1]}[boundary]
+        lower[1:] = own[:-1]
+        lower[0] = {"free": outside, "periodic": own[-1], "mirror": own[0]}[boundary]
+        upper[:-1] = own[1:]
+        upper[-1] = {"free": outside, "periodic": own[0], "mirror": own[-1]}[boundary]
         yield from (lower, upper) if own is mask else (lower.T, upper.T)
 
 
