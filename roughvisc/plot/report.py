@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import base64
+import gc
 import io
 import json
-from collections.abc import Sequence
-from contextlib import nullcontext, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext, suppress
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -41,10 +42,24 @@ from roughvisc.variables import AXES, VARIABLES, axis_of, in_table
 _SHOWN, _DRAWN = 6, 2
 #: Resolution of pictures, and the width from which a narrow screen scrolls them. [1/inch], [inch]
 _DPI, _WIDE = 110, 5.5
+#: Size of a result below which it is read as a whole. [byte]
+_LOADED = 64 << 20
 #: Surface parameters shown.
 _PARAMETERS = ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdq", "Sdr", "missing_fraction")
 
 
+@contextmanager
+def _rare_garbage_collection() -> Iterator[None]:
+    """Collect garbage rarely within the block: figures consist of many small objects, and few become garbage."""
+    usual = gc.get_threshold()
+    gc.set_threshold(100_000, *usual[1:])
+    try:
+        yield
+    finally:
+        gc.set_threshold(*usual)
+
+
+@_rare_garbage_collection()
 def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, processes: int = 1) -> Path:
     """Write a page that shows results: cases, accuracy, figures, surface, assumptions, and how to repeat them.
 
@@ -152,6 +167,8 @@ def _audits(cases: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def _picture(caption: str, figure: Figure) -> dict[str, Any]:
     """Return a figure as a PNG in a data URL, with its caption."""
     stream = io.BytesIO()
+    for axis in (axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis) if not axis.label.get_text()):
+        axis.set_label_coords(0, 0)  # matplotlib need not measure the numbers to place an empty label
     figure.savefig(stream, format="png", dpi=_DPI)
     src = f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
     width = figure.get_figwidth()
@@ -163,6 +180,8 @@ def _case(job: tuple[Path | xr.Dataset, int, bool, bool]) -> dict[str, Any]:
     source, number, is_shown, is_drawn = job
     with open_result(source) if isinstance(source, Path) else nullcontext(source) as dataset:
         dataset = expect_result(dataset, "x", "y")
+        if is_shown and dataset.nbytes < _LOADED:
+            dataset = dataset.load()  # otherwise each frame opens the file
         case = json.loads(dataset.attrs.get("case", "{}"))
         title = str(case.get("title") or dataset.attrs.get("title") or f"case {number}")
         found = {"title": title, "name": case_words(case) or title, "key": str(dataset.attrs.get("case_key", ""))}

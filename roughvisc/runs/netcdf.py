@@ -108,6 +108,29 @@ def open_without_steps(path: Path) -> xr.Dataset:
     return _opened(path, steps=False)
 
 
+def read_steps(path: Path) -> xr.Dataset | None:
+    """Read only the history of the steps of a result; None if it has none.
+
+    Raises
+    ------
+    InputError
+        If the file is absent, cannot be read, or is damaged.
+    """
+    require_result(path)
+    try:
+        with NETCDF, netCDF4.Dataset(**_named(path)) as file:
+            file.set_auto_maskandscale(False)
+            file.set_auto_chartostring(False)
+            return _steps(str(path), file)
+    except ERRORS as error:
+        raise unreadable(path, error) from error
+
+
+def _steps(path: str, file: netCDF4.Dataset) -> xr.Dataset | None:
+    """Return the history of the steps in an open result."""
+    return _dataset(path, file.groups[STEPS]).set_coords("time") if STEPS in file.groups else None
+
+
 def _opened(path: Path, **options: Any) -> xr.Dataset:
     """Open a result with options of :class:`ResultBackend`."""
     require_result(path)
@@ -134,9 +157,9 @@ class ResultBackend(BackendEntrypoint):
             file.set_auto_maskandscale(False)
             file.set_auto_chartostring(False)
             result = _dataset(path, file).drop_vars(drop_variables or (), errors="ignore")
-            carried = _dataset(path, file.groups[STEPS]) if steps and STEPS in file.groups else None
+            carried = _steps(path, file) if steps else None
         if carried is not None:
-            result.encoding[CARRIED] = carried.set_coords("time")
+            result.encoding[CARRIED] = carried
         return result
 
 

@@ -25,7 +25,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.labels import ATTRIBUTES, CARRIED, label, steps_of
+from roughvisc.labels import ATTRIBUTES, CARRIED, label
 from roughvisc.paths import path_of
 from roughvisc.runs.folder import (
     DAMAGED,
@@ -35,7 +35,7 @@ from roughvisc.runs.folder import (
     read_json,
     write_json,
 )
-from roughvisc.runs.netcdf import lazy, open_result, open_without_steps, read_variable
+from roughvisc.runs.netcdf import lazy, open_without_steps, read_steps, read_variable
 from roughvisc.study.case import Case, identifier, labels_of, parameters_of
 from roughvisc.study.sweep_table import DRAWN, REALISATION
 from roughvisc.variables import AXES, ROW, ROWS, VARIABLES, axis_of
@@ -328,7 +328,7 @@ class _Steps:
     def __call__(self, key: str) -> xr.Dataset | None:
         """Return the history of the steps of a case."""
         if key not in self.read:
-            self.read[key] = steps_of(open_result(case_path(self.folder, key, "result")))
+            self.read[key] = read_steps(case_path(self.folder, key, "result"))
         return self.read[key]
 
 
