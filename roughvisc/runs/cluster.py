@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import concurrent.futures
 import logging
+import math
 import secrets
 import signal
 import sys
@@ -39,6 +40,8 @@ log = logging.getLogger("roughvisc")
 _WINDOW, _CASES_AHEAD = 200, 4
 #: Time between two looks at finished cases, and for short cases. [s]
 _POLL_EVERY, _POLL_SHORT = 0.1, 0.02
+#: Time between two counts of the workers. [s]
+_COUNT_EVERY = 2.0
 #: Time between two reports of one case. [s]
 _REPORT_EVERY = 0.5
 #: Time for running cases to finish their step after an interrupt. [s]
@@ -76,6 +79,7 @@ def local_client(processes: int) -> Iterator[Client]:
         # a killed worker may take long to start again on a busy machine
         "distributed.deploy.lost-worker-timeout": "300s",
         "distributed.worker.profile.enabled": False,  # profiling slows the cases down
+        "distributed.admin.tick.interval": "1s",  # 20 ms by default in each of three servers, half of their idle cost
     }
     with dask.config.set(settings):
         try:
@@ -224,11 +228,18 @@ def distribute(
     alone_since = time.monotonic()
     try:
         waiting = iter(cases)
+        left = len(cases)
+        ahead = _WINDOW
+        counted_at = -math.inf
         pause = _POLL_EVERY
         while True:
-            room = max(_WINDOW, _CASES_AHEAD * len(client.nthreads())) - len(futures)
-            if room > 0 and (keys := list(islice(waiting, room))):
+            if left and time.monotonic() - counted_at > _COUNT_EVERY:  # each question costs as much as a look
+                ahead = max(_WINDOW, _CASES_AHEAD * len(client.nthreads()))
+                counted_at = time.monotonic()
+            keys = list(islice(waiting, max(0, ahead - len(futures))))
+            if keys:
                 submit(keys)
+            left -= len(keys)
             if not futures:
                 break
             for future in finished.next_batch(block=False):
