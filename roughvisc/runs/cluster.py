@@ -216,8 +216,8 @@ def distribute(
         finished.update(new)
 
     def heard(event: tuple[float, dict[str, Any]]) -> None:
-        key, worker, now, end = event[1].values()
-        if not end:
+        key, worker, begins, now, end = event[1].values()
+        if begins:
             if workers[key]:
                 log.info("%s: worker %s has gone, resumes on %s", key, workers[key][-1], worker)
                 display.say(f"worker {workers[key][-1]} has gone; the case resumes on {worker}", key)
@@ -326,11 +326,12 @@ def on_worker(
     if own and not log.handlers:
         log.addHandler(logging.NullHandler())  # the process of the sweep displays the warnings of the result
 
-    def report(now: float, end: float) -> None:
+    def report(now: float, end: float, *, begins: bool = False) -> None:
         nonlocal last
-        if not end or time.monotonic() - last >= _REPORT_EVERY:
+        if begins or time.monotonic() - last >= _REPORT_EVERY:
             last = time.monotonic()
-            worker.log_event(name, {"key": key, "worker": worker.address, "now": float(now), "end": float(end)})
+            about = {"key": key, "worker": worker.address, "begins": begins, "now": float(now), "end": float(end)}
+            worker.log_event(name, about)
 
     def stop() -> bool:
         state = worker.state.tasks.get(task)  # None or cancelled if the client has closed
@@ -339,7 +340,7 @@ def on_worker(
     with _one_at_a_time:
         if stop():
             return Outcome(key, "interrupted")
-        report(0.0, 0.0)
+        report(0.0, 0.0, begins=True)
         try:
             if not Path(folder).is_dir():
                 raise RoughviscError(f"{folder}: does not exist")

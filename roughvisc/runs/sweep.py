@@ -35,11 +35,10 @@ from roughvisc.runs.folder import (
     log_file,
     record_failure,
     require_writable,
-    write_json,
 )
 from roughvisc.runs.observed import observe
 from roughvisc.runs.run import FULL, REFUSED, Outcome, attempt, outcome_of, result_folder, run_case
-from roughvisc.runs.sweep_data import SWEEP, index_of, numbers_of, open_results, sweep_cases
+from roughvisc.runs.sweep_data import index_of, numbers_of, open_results, write_sweep
 from roughvisc.solve import Progress
 from roughvisc.study.case import Case, cases_given
 
@@ -189,9 +188,8 @@ def run_cases(
     folder.mkdir(parents=True, exist_ok=True)
     clean_folder(folder)
     distinct = {key: case.stored(folder) for key, case in distinct.items()}
-    listed = sweep_cases(cases, folder)
     with log_file(folder):
-        write_json(folder / SWEEP, listed)
+        write_sweep(cases, folder)
         index, outcomes = index_of(folder), dict[str, Outcome]()
         for key in distinct:
             if entry := index.get(key):
@@ -201,7 +199,7 @@ def run_cases(
         for key, case in distinct.items():
             if case.late_times:
                 log.info("%s: %s", key, case.note)
-        display.begin(cases, numbers_of(listed))
+        display.begin(cases, numbers_of({case.key: {"varied": dict(case.varied)} for case in cases}))
         for outcome in outcomes.values():
             display.ended(outcome)
         warned = set[str]()

@@ -6,6 +6,7 @@ results if it is absent, damaged or older than the results.
 
 from __future__ import annotations
 
+import gzip
 import json
 import logging
 import os
@@ -30,6 +31,7 @@ from roughvisc.paths import path_of
 from roughvisc.runs.folder import (
     DAMAGED,
     KEY,
+    atomic_write,
     case_path,
     no_results,
     read_json,
@@ -221,6 +223,23 @@ def _read_cache(folder: Path) -> dict[str, Entry]:
 def sweep_cases(cases: Sequence[Case], folder: Path | None = None) -> dict[str, dict[str, Any]]:
     """Return key -> JSON of each distinct case, in the order of the study, with paths relative to a folder."""
     return {key: json.loads(case.to_json(folder)) for key, case in {case.key: case for case in cases}.items()}
+
+
+def write_sweep(cases: Sequence[Case], folder: Path) -> None:
+    """Write the list of the cases of a sweep into its folder, one by one, because a hundred thousand may fill memory.
+
+    If writing fails, an existing list is not changed.
+    """
+    distinct = {case.key: case for case in cases}
+    with (
+        suppress(OSError, InputError),
+        atomic_write(folder / SWEEP) as temporary,
+        temporary.open("wb") as stored,
+        gzip.GzipFile("", "wb", compresslevel=1, fileobj=stored, mtime=0) as file,
+    ):
+        for number, (key, case) in enumerate(distinct.items()):
+            file.write(f"{', ' if number else '{'}{json.dumps(key)}: {case.to_json(folder)}".encode())
+        file.write(b"}")
 
 
 def read_sweep(folder: Path) -> dict[str, dict[str, Any]]:
