@@ -12,6 +12,7 @@ import xarray as xr
 from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize, TwoSlopeNorm
+from matplotlib.contour import ContourSet
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import Patch
@@ -24,6 +25,7 @@ from roughvisc.observables import contact, leakage
 from roughvisc.observables.history import expect_result, need
 from roughvisc.paths import path_of
 from roughvisc.plot import style
+from roughvisc.progress import reporting
 from roughvisc.runs.folder import atomic_write
 from roughvisc.topography.filters import fill, off_plane
 from roughvisc.topography.grid import cell_edges, checked, require_heights, spacing
@@ -222,14 +224,18 @@ def contact_of(dataset: xr.Dataset, frame: int) -> xr.DataArray | None:
     return None
 
 
-def draw_outline(ax: Axes, contact: xr.DataArray | None) -> None:
-    """Draw a thin dark line around the contact, in proportion to the cells, so that small spots keep their colour."""
+def draw_outline(ax: Axes, contact: xr.DataArray | None) -> ContourSet | None:
+    """Draw a thin dark line around the contact, in proportion to the cells, so that small spots keep their colour.
+
+    Return the line; None if no cell or every cell touches.
+    """
     if contact is None or not 0 < contact.mean() < 1:
-        return
+        return None
     plane = plane_unit(contact)
     width = ax.get_position().width * ax.figure.get_figwidth() * 72 / contact.sizes["x"]  # of a cell [pt]
     x, y = plane(contact["x"]), plane(contact["y"])
-    ax.contour(x, y, contact, [0.5], colors=style.OUTLINE, linewidths=float(np.clip(0.4 * width, 0.04, 0.5)))
+    thin = float(np.clip(0.4 * width, 0.04, 0.5))
+    return ax.contour(x, y, contact, [0.5], colors=style.OUTLINE, linewidths=thin)
 
 
 def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, norm: Normalize) -> AxesImage:
@@ -440,7 +446,9 @@ def section(dataset: xr.Dataset, time: Any = None, axis: str = "x", at: Quantity
 @style.apply
 @quantities(rate="1/s > 0")
 def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, rate: Quantity = 12.0) -> Path:
-    """Write an animation of a map, whose title states the time or speed.
+    """Write an animation of a map with the outline of the contact; its title states the time or speed.
+
+    A progress bar counts the frames.
 
     Parameters
     ----------
@@ -476,13 +484,22 @@ def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, rate: Q
     figure, (ax,) = style.new_panels(1, 1, map_size(dataset, 3.2, 4.2), right=style.BAR)
     image = draw_map(ax, frame_of(dataset, name, 0), unit, norm)
     style.colour_bar(image, [ax], unit.label(VARIABLES[name].label))
+    outline: ContourSet | None = None
 
     def draw(frame: int) -> None:
+        nonlocal outline
         ax.set_title(frame_title(dataset, frame))
         image.set_data(np.ma.masked_invalid(unit(frame_of(dataset, name, frame).transpose("y", "x"))))
+        if outline is not None:
+            outline.remove()
+        outline = draw_outline(ax, contact_of(dataset, frame))
 
-    with atomic_write(path) as temporary:
-        FuncAnimation(figure, draw, count, cache_frame_data=False).save(temporary, writer(fps=rate), dpi=100)
+    with (
+        atomic_write(path) as temporary,
+        reporting("animation", lambda done, count: f"{done:.0f} of {count:.0f} frames") as report,
+    ):
+        animation = FuncAnimation(figure, draw, count, cache_frame_data=False)
+        animation.save(temporary, writer(fps=rate), dpi=100, progress_callback=lambda frame, _: report(frame, count))
     return path
 
 
