@@ -30,6 +30,7 @@ from roughvisc.runs.netcdf import open_result
 from roughvisc.runs.run import result_folder
 from roughvisc.runs.sweep import run_one
 from roughvisc.study.case import Case, case_given
+from roughvisc.study.case_text import case_words
 from roughvisc.study.properties import properties
 from roughvisc.topography.borders import border_mismatch
 from roughvisc.topography.framing import mirror
@@ -392,7 +393,7 @@ def border(scene: Scene) -> Found:
         return 0.0, "The surface repeats with its mirror images: its borders meet."
     number = max(border_mismatch(scene.height))
     advice = "" if number < LIMITS["border"].doubtful else ' Use boundary = "mirror".'
-    return number, f"Opposite borders differ {number:.2g} times as much as neighbouring rows.{advice}"
+    return number, f"The difference of opposite borders is {number:.2g} times that of neighbouring rows.{advice}"
 
 
 def _periodic_relief(scene: Scene, sheet: Sheet) -> float:
@@ -616,4 +617,8 @@ def audit_of(result: xr.Dataset, **given: Any) -> Audit:
             found = math.nan, str(missing)
         if found is not None:
             findings.append(Finding(name, *found, limit))
-    return Audit(str(result.attrs.get("title", "")), tuple(findings))
+    title = str(result.attrs.get("title", ""))
+    if case is not None and case.varied:
+        words = case_words({"varied": dict(case.varied)})
+        title = f"{case.title}, {words[:1].lower()}{words[1:]}"
+    return Audit(title, tuple(findings))
