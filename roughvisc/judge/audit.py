@@ -160,7 +160,8 @@ class Scene:
     @cached_property
     def fullest(self) -> xr.Dataset:
         """Row with the largest force; among equal forces the last row with the largest contact area."""
-        force, area = self.dataset["force"].values, self.dataset["contact_area"].values
+        force = self.dataset["force"].values
+        area = self.dataset["contact_area"].values
         ranks = np.lexsort((np.nan_to_num(area), force >= force.max() * (1 - _ROUNDING)))  # NaN: not solved
         return self.dataset.isel({axis_of(self.dataset): ranks[-1]})
 
@@ -278,7 +279,9 @@ def adhesion(scene: Scene) -> Found:
     if "range_of_adhesion" in scene.dataset.attrs:
         w, reach = (scene.dataset.attrs[f"{name}_of_adhesion"] for name in ("work", "range"))
         return 0.0, f"Modelled: {as_text(w, 'J/m^2', 3)} with a range of {as_text(reach, 'm', 3)}."
-    force, curvature, fraction = scene.force, scene.curvature, float(scene.fullest["contact_fraction"])
+    force = scene.force
+    curvature = scene.curvature
+    fraction = float(scene.fullest["contact_fraction"])
     if scene.boundary != "free" and fraction > _MERGED:
         raise NotKnown(f"{percent(fraction)} of the area is in contact, without separate spots.")
     if not curvature * _FLAT * scene.half_width > 1:
@@ -330,11 +333,14 @@ def inertia(scene: Scene) -> Found:
     :math:`V^2 / (c^2 - V^2)`. Up to 0.7 ``c`` this is 0.85 to 1.4 times the exact increase for any Poisson ratio from
     0 to 0.5.
     """
-    width, scale, speed = scene.half_width, float(scene.facts["time_scale"]), scene.slide[0]
+    width = scene.half_width
+    scale = float(scene.facts["time_scale"])
+    speed = scene.slide[0]
     [density] = scene.need("density")
     shear = (1 - float(scene.facts.get("poisson", _SOFTEST))) / (2 * scene.late)
     waves = math.sqrt(shear / density)
-    lag, excess = 0.85 * width / waves, speed**2 / (waves**2 - speed**2) if speed < waves else math.inf
+    lag = 0.85 * width / waves
+    excess = speed**2 / (waves**2 - speed**2) if speed < waves else math.inf
     if excess > lag / scale:
         slides = f"the profile slides at {as_text(speed, 'm/s')}"
         return excess, f"Shear waves travel at {as_text(waves, 'm/s')}, and {slides}."
@@ -355,7 +361,9 @@ def heating(scene: Scene) -> Found:
     if "temperature" in scene.dataset:
         warmest = float(scene.dataset["temperature"].max())
         return 0.0, f"Modelled: the contact is warmed up to {warmest:.4g} K."
-    spots, area, heat = spot_count(scene.pressure_in(rubbed)), float(rubbed["contact_area"]), max(power, 0.0)
+    spots = spot_count(scene.pressure_in(rubbed))
+    area = float(rubbed["contact_area"])
+    heat = max(power, 0.0)
     conductivity, capacity = scene.need("heat_conductivity", "volumetric_heat_capacity")
     radius = math.sqrt(area / (math.pi * spots))
     rise = surface_rise(heat / area, radius, speed, conductivity, capacity)
@@ -609,7 +617,8 @@ def audit_of(result: xr.Dataset, **given: Any) -> Audit:
         source = result.encoding.get("source")
         case = Case.from_json(result.attrs["case"], Path(source).parent if source else None)
         given = {**case.audit_inputs, **given}
-    scene, findings = Scene(result, given, case), []
+    scene = Scene(result, given, case)
+    findings = []
     for name, limit in LIMITS.items():
         try:
             found = limit.check(scene)

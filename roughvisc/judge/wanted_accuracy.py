@@ -32,9 +32,13 @@ from roughvisc.units import number
 
 log = logging.getLogger("roughvisc")
 #: First and smallest tolerance over the target; largest and smallest tolerance of all.
-_PART, _LEAST, _LARGEST, _SMALLEST = 0.2, 0.006, 1e-2, 1e-8
+_PART = 0.2
+_LEAST = 0.006
+_LARGEST = 1e-2
+_SMALLEST = 1e-8
 #: Level of the finest grid: its cells are ``2**-2`` times as long as in the study. Fewest cells a side of any grid.
-_FINEST, _FEWEST = -2, 12
+_FINEST = -2
+_FEWEST = 12
 #: Accepted ratio of an error to the target, since messages round both.
 _ROUNDING = 1.005
 #: Source -> what would reduce its error. The later ones depend neither on the grid nor on the tolerance.
@@ -123,7 +127,8 @@ def choose(
     targets = targets_of(want)
     wanted = {name: math.log1p(target) for name, target in targets.items()}
     observed = [quantity_of(case, name) for name in targets]
-    height, smallest = case.height(), min(targets.values())
+    height = case.height()
+    smallest = min(targets.values())
     base = neighbours.with_kept(case, [field for one in observed for field in one.fields])
     tolerance = min(max(_PART * smallest, _SMALLEST), _LARGEST)
     axis = case.experiment.axis
@@ -182,7 +187,8 @@ def _refuse_missed(
 ) -> None:
     """Refuse the first target below the error by some sources; name the largest one, and what would reduce it."""
     for name, budget in budgets.items():
-        wanted, error = math.log1p(targets[name]), error_of(budget, sources)
+        wanted = math.log1p(targets[name])
+        error = error_of(budget, sources)
         if error <= _ROUNDING * wanted:
             continue
         if math.isinf(error):

@@ -39,9 +39,11 @@ from roughvisc.units import unit_for
 from roughvisc.variables import AXES, VARIABLES, axis_of, in_table
 
 #: Largest numbers of cases with audit and study, and with figures; both are evenly spread.
-_SHOWN, _DRAWN = 6, 2
+_SHOWN = 6
+_DRAWN = 2
 #: Resolution of pictures, and the width from which a narrow screen scrolls them. [1/inch], [inch]
-_DPI, _WIDE = 110, 5.5
+_DPI = 110
+_WIDE = 5.5
 #: Size of a result below which it is read as a whole. [byte]
 _LOADED = 64 << 20
 #: Surface parameters shown.
@@ -91,13 +93,16 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
         "text": _text,
     }
     out = out if out is None else path_of(out, "out")
-    sources, numbers, histories = [results], {}, {}
+    sources = [results]
+    numbers = {}
+    histories = {}
     if isinstance(results, xr.Dataset):
         if out is None:
             raise InputError("out is None: expected the name of the page, if a Dataset is given")
     elif (folder := path_of(results, "results")).is_dir():
         out = out or folder / "report.html"
-        sources, failed = result_files(folder), (path.name.partition(".")[0] for path in folder.glob("*.failed.json"))
+        sources = result_files(folder)
+        failed = (path.name.partition(".")[0] for path in folder.glob("*.failed.json"))
         page["failures"] = {key: recorded_failure(folder, key) for key in sorted(failed)}
         if not sources and not page["failures"]:
             raise no_results(folder)
@@ -107,7 +112,8 @@ def report(results: str | Path | xr.Dataset, out: str | Path | None = None, *, p
             page["figures"] = [_picture(caption, figure) for _, caption, figure in sweep_figures(swept)]
             histories = _histories(swept)
     else:
-        out, sources = out or folder.with_name(f"{folder.stem}-report.html"), [folder]
+        out = out or folder.with_name(f"{folder.stem}-report.html")
+        sources = [folder]
     shown = _spread(range(len(sources)), _SHOWN)
     drawn_cases = _spread(shown, _DRAWN)
     jobs = [
@@ -217,7 +223,8 @@ def _cells(dataset: xr.Dataset) -> dict[str, str]:
     cells = {"Grid": f"{dataset.sizes['x']} × {dataset.sizes['y']}"}
     cells |= {variable.label: _text(telling[name]) for name, variable in in_table("value").items() if name in telling}
     if "stated_error" in dataset and dataset["stated_error"].notnull().any():
-        worst, tolerance = float(dataset["stated_error"].max()), dataset.attrs.get("tolerance", np.inf)
+        worst = float(dataset["stated_error"].max())
+        tolerance = dataset.attrs.get("tolerance", np.inf)
         above = f", above the tolerance of {tolerance:g}" if worst > tolerance else ""
         cells[VARIABLES["stated_error"].label] = f"{worst:.2g}{above}"
     cells[VARIABLES["grid_error"].label] = grid_error_of([dataset])

@@ -37,9 +37,11 @@ log = logging.getLogger("roughvisc")
 
 #: Number of cases at the scheduler at a time, and least number for each worker. The first result does not wait until
 #: all cases are sent, and the memory of the scheduler does not grow with the sweep.
-_WINDOW, _CASES_AHEAD = 200, 4
+_WINDOW = 200
+_CASES_AHEAD = 4
 #: Time between two looks at finished cases, and for short cases. [s]
-_POLL_EVERY, _POLL_SHORT = 0.1, 0.02
+_POLL_EVERY = 0.1
+_POLL_SHORT = 0.02
 #: Time between two counts of the workers. [s]
 _COUNT_EVERY = 2.0
 #: Time between two reports of one case. [s]
@@ -206,7 +208,8 @@ def distribute(
     settings = {"folder": str(folder), "stop_file": str(stop_file), "name": name, "threads": threads, "own": own}
     futures: dict[Future[Outcome], str] = {}
     workers: dict[str, list[str]] = {key: [] for key in cases}  # in the order in which they began each case
-    number, taken_over = count(), set[str]()
+    number = count()
+    taken_over = set[str]()
     finished = as_completed([], loop=client.loop)
 
     def submit(keys: Sequence[str]) -> None:
@@ -267,7 +270,8 @@ def distribute(
         display.say("stopping: the running cases finish their step; Ctrl-C again ends at once")
         with suppress(OSError):  # a full disk, or a lost scheduler
             stop_file.touch()
-            begun, until = [future for future, key in futures.items() if workers[key]], time.monotonic() + _PATIENCE
+            begun = [future for future, key in futures.items() if workers[key]]
+            until = time.monotonic() + _PATIENCE
             while time.monotonic() < until and client.nthreads() and not all(future.done() for future in begun):
                 time.sleep(0.1)
         raise
@@ -289,14 +293,16 @@ def _outcome(key: str, future: Future[Outcome]) -> Outcome:
     except (CancelledError, concurrent.futures.CancelledError):
         return Outcome(key, "interrupted")
     except KilledWorker as error:
-        name, place = "KilledWorker", error.last_worker.address
+        name = "KilledWorker"
+        place = error.last_worker.address
         message = (
             f"its worker was lost {error.allowed_failures + 1} times, the last at {place}: killed, out of memory "
             "(roughvisc plan says how much a case needs), or out of time; repeat the command to resume from the last "
             "checkpoint"
         )
     except Exception as error:  # noqa: BLE001  (such as a worker without roughvisc)
-        name, message = type(error).__name__, f"{type(error).__name__}: {error}"
+        name = type(error).__name__
+        message = f"{type(error).__name__}: {error}"
     return Outcome(key, "hindered", message, name)
 
 
@@ -321,7 +327,8 @@ def on_worker(
     from distributed import get_worker
 
     worker = get_worker()
-    task, last = worker.get_current_task(), 0.0
+    task = worker.get_current_task()
+    last = 0.0
     worker.loop.add_callback(_take_signals, worker, own)
     if own and not log.handlers:
         log.addHandler(logging.NullHandler())  # the process of the sweep displays the warnings of the result

@@ -48,7 +48,8 @@ _CHUNK = (8, 64, 64)
 #: Number of cells above which a chunk contains one frame, because several frames may exceed the memory; and this chunk.
 #: At 4096 x 4096 x 20, compressed, both times are in ms: (8, 64, 64) 2809 and 12; (2, 256, 256) 1277 and 51;
 #: (1, 256, 256) 331 and 41; (1, 1024, 1024) 309 and 302.
-_MANY_CELLS, _CHUNK_OF_MANY = 1 << 20, (1, 256, 256)
+_MANY_CELLS = 1 << 20
+_CHUNK_OF_MANY = (1, 256, 256)
 #: Longest side of a chunk of any other variable: a map of 1024 x 1024 doubles has 8 MB.
 _LONGEST_CHUNK = 1024
 #: Variables without missing values.
@@ -138,7 +139,8 @@ def _opened(path: Path, **options: Any) -> xr.Dataset:
         dataset = xr.open_dataset(path, engine=ResultBackend, **options)
     except ERRORS as error:
         raise unreadable(path, error) from error
-    expected, rows = f"a result of roughvisc of format {RESULT_FORMAT}", axis_of(dataset.variables)
+    expected = f"a result of roughvisc of format {RESULT_FORMAT}"
+    rows = axis_of(dataset.variables)
     if (stated := dataset.attrs.get("result_format", RESULT_FORMAT)) != RESULT_FORMAT:
         raise unusable(path, f"is of format {stated}", expected)
     for name in AXES[rows].needed:
@@ -256,7 +258,8 @@ def verify(place: str | Path) -> dict[Path, str]:
     InputError
         If the path does not exist, or the folder contains no result.
     """
-    place, flaws = path_of(place, "place", "a result, or of a folder of results"), {}
+    place = path_of(place, "place", "a result, or of a folder of results")
+    flaws = {}
     if not place.exists():
         raise InputError(f"{place}: does not exist: expected a result, or a folder of results")
     for path in results_at(place):

@@ -183,14 +183,16 @@ def run_cases(
     if workers is not None and (client is not None or workers < 0):
         raise InputError(key="workers", found=workers, expected="0 or more, and none together with a client")
     require_synchronous(client)
-    distinct, folder = {case.key: case for case in cases}, folder.absolute()
+    distinct = {case.key: case for case in cases}
+    folder = folder.absolute()
     require_writable(folder, "for the results")
     folder.mkdir(parents=True, exist_ok=True)
     clean_folder(folder)
     distinct = {key: case.stored(folder) for key, case in distinct.items()}
     with log_file(folder):
         write_sweep(cases, folder)
-        index, outcomes = index_of(folder), dict[str, Outcome]()
+        index = index_of(folder)
+        outcomes = dict[str, Outcome]()
         for key in distinct:
             if entry := index.get(key):
                 outcomes[key] = outcome_of(entry, reused=True)

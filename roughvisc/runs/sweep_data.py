@@ -54,7 +54,8 @@ CASE_KEY = "case_key"
 #: Size of a block, which is read in one call: several frames of a small grid, one frame of a large grid. [byte]
 _BLOCK = 16 << 20
 #: Number of results from which a client reads them, and number for a task; reading one takes about 10 ms.
-_MANY, _TOGETHER = 200, 50
+_MANY = 200
+_TOGETHER = 50
 
 
 @dataclass(frozen=True)
@@ -326,7 +327,8 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.
     if len(axes := {entry.along: entry.file for entry in entries}) > 1:
         found = ", ".join(f"{file} over {along}" for along, file in axes.items())
         raise InputError(f"{folder}: found {found}: expected results over one axis; give cases", key="cases")
-    numbers, keys = numbers_of(listed), [entry.key for entry in entries]
+    numbers = numbers_of(listed)
+    keys = [entry.key for entry in entries]
     parameters = {name: values[here] for name, values in parameters_of([*listed.values()]).items()}
     labels = labels_of(parameters, listed[keys[0]], ("case",)) | {
         "case": (("case",), np.array([numbers[key] for key in keys]), {"long_name": "number of the case"}),
