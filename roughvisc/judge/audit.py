@@ -595,16 +595,16 @@ def audit(
     if not isinstance(result, xr.Dataset):
         case = case_given(result, "result")
         result = open_result(run_one(case, result_folder(case, out), progress=progress, threads=threads))
-    found = audit_of(result, **named)
+    findings = audit_of(result, **named)
     columns = {
-        "verdict": ("verdict", [one.verdict for one in found]),
-        "number": ("number that is compared with the limits", [one.number for one in found]),
-        "doubtful": ("number from which the assumption is doubtful", [one.limit.doubtful for one in found]),
-        "broken": ("number from which the assumption is broken", [one.limit.broken for one in found]),
-        "sentence": ("meaning of the number", [one.sentence for one in found]),
+        "verdict": ("verdict", [one.verdict for one in findings]),
+        "number": ("number that is compared with the limits", [one.number for one in findings]),
+        "doubtful": ("number from which the assumption is doubtful", [one.limit.doubtful for one in findings]),
+        "broken": ("number from which the assumption is broken", [one.limit.broken for one in findings]),
+        "sentence": ("meaning of the number", [one.sentence for one in findings]),
     }
     variables = {name: ("assumption", values, {"long_name": text}) for name, (text, values) in columns.items()}
-    return xr.Dataset(variables, {"assumption": [one.name for one in found]}, {"title": found.title})
+    return xr.Dataset(variables, {"assumption": [one.name for one in findings]}, {"title": findings.title})
 
 
 def audit_of(result: xr.Dataset, **given: Any) -> Audit:
@@ -621,11 +621,11 @@ def audit_of(result: xr.Dataset, **given: Any) -> Audit:
     findings = []
     for name, limit in LIMITS.items():
         try:
-            found = limit.check(scene)
+            checked = limit.check(scene)
         except NotKnown as missing:
-            found = math.nan, str(missing)
-        if found is not None:
-            findings.append(Finding(name, *found, limit))
+            checked = math.nan, str(missing)
+        if checked is not None:
+            findings.append(Finding(name, *checked, limit))
     title = str(result.attrs.get("title", ""))
     if case is not None and case.varied:
         words = case_words({"varied": dict(case.varied)})

@@ -107,8 +107,8 @@ class Observable:
 
     def of(self, result: xr.Dataset, case: Case) -> Array:
         """Return the values of the number in a result of a case, over the axis."""
-        found = result[self.name] if self.derive is None else self.derive(result, case.observed)
-        return np.asarray(found.values, dtype=float)
+        values = result[self.name] if self.derive is None else self.derive(result, case.observed)
+        return np.asarray(values.values, dtype=float)
 
     def stated_error(self, result: xr.Dataset, values: Array) -> Array:
         """Return the error of the number's logarithm by steps and solver, from the stated errors of the rows. [-]
@@ -129,11 +129,11 @@ class Observable:
 
 
 def _thermal_conductance(result: xr.Dataset, observe: Observe) -> xr.DataArray:
-    found = conductance(result, **observe.get("conductance", {"resistivity": (1.0, 1.0)}))
-    if "thermal_conductance" not in found:
+    conductances = conductance(result, **observe.get("conductance", {"resistivity": (1.0, 1.0)}))
+    if "thermal_conductance" not in conductances:
         expected = "a study that observes a thermal conductance, not an electrical one"
         raise InputError(key="quantity", found="thermal_conductance", expected=expected)
-    return found["thermal_conductance"]
+    return conductances["thermal_conductance"]
 
 
 def _leak_rate(result: xr.Dataset, observe: Observe) -> xr.DataArray:
@@ -312,16 +312,16 @@ def coarser_grids(base: Case, height: xr.DataArray, coarsening: float) -> tuple[
     wave = max(shortest_wave(height), 2 * cell) if is_limited else math.inf
     fine = on_cells(base, height, coarsening)
     before = wave
-    found = []
+    coarser = []
     for part in (2.0, 4.0):  # two grids may agree by chance
         coarse = on_cells(base, height, part * coarsening)
         shortest = max(wave, 2 * part * cell)
         against = changed(fine, {"surface.shortest_wave": shortest}) if shortest > _SAME * before else fine
         longer = shortest / wave if is_limited else 1.0
-        found.append(Neighbour(coarse, GRID_SAFETY, against, longer / part, longer))
+        coarser.append(Neighbour(coarse, GRID_SAFETY, against, longer / part, longer))
         fine = coarse
         before = shortest
-    return tuple(found)
+    return tuple(coarser)
 
 
 def sources_of(
@@ -354,27 +354,30 @@ def sources_of(
     others = others or coarsening
     grids = coarser_grids(base, height, coarsening)
     own, coarse = (on_cells(base, height, part * others) for part in (1.0, 2.0))
-    found = {STEPS: Source("errors that the result states"), GRID: Source("cells twice and four times as long", grids)}
+    sources = {
+        STEPS: Source("errors that the result states"),
+        GRID: Source("cells twice and four times as long", grids),
+    }
 
     if sample and population == "ensemble":
         few = [max(2, round(n / (2 * others))) for n in height.shape]
         patches = [changed(base, {"surface.resample": few, "surface.realisation": n + 1}) for n in range(_PATCHES)]
         near = tuple(Neighbour(patch, _SAMPLE_FACTOR, coarse) for patch in patches)
-        found[SAMPLE] = Source(f"{_PATCHES} Gaussian surrogates on cells twice as long", near)
+        sources[SAMPLE] = Source(f"{_PATCHES} Gaussian surrogates on cells twice as long", near)
     if sample and cutoff is None:
-        found[OCTAVE] = Source("cutoff is not given: the shortest wavelength that the real surface has", is_open=True)
+        sources[OCTAVE] = Source("cutoff is not given: the shortest wavelength that the real surface has", is_open=True)
     elif sample:
         assert cutoff is not None
         end = unit_for(cutoff, "m").text(cutoff, 3)
         shortest = shortest_wave(height)
-        found[OCTAVE] = Source(f"the grid holds all waves down to {end}")
+        sources[OCTAVE] = Source(f"the grid holds all waves down to {end}")
         if is_narrow_band(height):
-            found[OCTAVE] = Source("the surface has waves of one length, and no shorter ones")
+            sources[OCTAVE] = Source("the surface has waves of one length, and no shorter ones")
         elif shortest >= _SAME * cutoff:
             octaves = math.log2(shortest / cutoff)
             words = f"without the shortest octave; {octaves:.2g} octaves down to {end} are missing"
             smooth = changed(own, {"surface.shortest_wave": 2 * shortest})
-            found[OCTAVE] = Source(words, (Neighbour(smooth, octaves, own),))
+            sources[OCTAVE] = Source(words, (Neighbour(smooth, octaves, own),))
 
     # the contact of an indenter has few cells, so changes of its material are solved on the grid of the case
     compared = coarse if sample else own
@@ -389,14 +392,14 @@ def sources_of(
             error = number(error, "1", key, least=0, below=1)
         if name == TIME_SCALE and not creeps:
             continue
-        found[name] = Source(f"{what} are exact")
+        sources[name] = Source(f"{what} are exact")
         if error is None:
-            found[name] = Source(f"{key} is not given: the relative error of the {what}", is_open=True)
+            sources[name] = Source(f"{key} is not given: the relative error of the {what}", is_open=True)
         elif error > 0:
             weight = math.log1p(error) / math.log(_CHANGE)
             one = Neighbour(changed(compared, changes), weight, compared)
-            found[name] = Source(f"{what} {100 * (_CHANGE - 1):.0f} % larger", (one,))
-    return found
+            sources[name] = Source(f"{what} {100 * (_CHANGE - 1):.0f} % larger", (one,))
+    return sources
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -631,7 +634,7 @@ def budget(
     if set(base.settings.fields) <= set(case.settings.fields) and is_result_of(case, finished):
         own = open_result(finished)
     computing = {"progress": progress, "client": client, "workers": workers, "threads": threads}
-    found = compared(base, sources_of(base, base.height(), known), observed, folder, own, **computing)
+    budgets = compared(base, sources_of(base, base.height(), known), observed, folder, own, **computing)
     if isinstance(quantity, str):
-        return found[quantity]
-    return xr.concat(list(found.values()), "quantity", combine_attrs="drop_conflicts")
+        return budgets[quantity]
+    return xr.concat(list(budgets.values()), "quantity", combine_attrs="drop_conflicts")

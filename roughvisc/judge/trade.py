@@ -192,7 +192,7 @@ def _ladder(data: bool, shape: tuple[int, int]) -> list[tuple[float, float]]:
     return rungs if data else rungs + [(one, grid) for grid, one in _FINER if max(shape) / grid <= _MOST]
 
 
-def _differences(found: xr.Dataset, wanted: xr.Dataset, names: Sequence[str]) -> NDArray[np.float64]:
+def _differences(result: xr.Dataset, wanted: xr.Dataset, names: Sequence[str]) -> NDArray[np.float64]:
     """Return the largest difference of each quantity over all rows, over the largest value of the second result.
 
     The difference of pressures is the integral of the absolute difference (L1), over the largest force. A quantity that
@@ -201,10 +201,10 @@ def _differences(found: xr.Dataset, wanted: xr.Dataset, names: Sequence[str]) ->
     errors = []
     for name in names:
         if name == "pressure":
-            error = pressure_distance(found, wanted)
+            error = pressure_distance(result, wanted)
             largest = float(wanted["force"].max())
         else:
-            one = found[name].values
+            one = result[name].values
             other = wanted[name].values
             error = np.abs(np.where(np.isnan(one) & np.isnan(other), 0.0, one - other))
             largest = float(np.fmax.reduce(np.abs(other), initial=0.0))

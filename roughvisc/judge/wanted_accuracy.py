@@ -148,18 +148,20 @@ def choose(
         [own] = neighbours.solve([chosen], folder / neighbours.FOLDER, **computing).values()
         own = own if places is None else neighbours.at_rows(own, axis, places)
         own = own.isel({axis: np.flatnonzero(own["force"] > 0)})
-        found = neighbours.compared(chosen, sources, observed, folder / neighbours.FOLDER, own, **computing)
+        budgets = neighbours.compared(chosen, sources, observed, folder / neighbours.FOLDER, own, **computing)
         cells = "{} x {} cells".format(*neighbours.shape_on(case, height, 2.0**level))
-        reached = [f"{name} {_percent(error_of(one))}, wanted {_percent(wanted[name])}" for name, one in found.items()]
+        reached = [
+            f"{name} {_percent(error_of(one))}, wanted {_percent(wanted[name])}" for name, one in budgets.items()
+        ]
         tell(f"{cells}: {'; '.join(reached)}")
-        steps = max(error_of(one, [neighbours.STEPS]) / wanted[name] for name, one in found.items())
+        steps = max(error_of(one, [neighbours.STEPS]) / wanted[name] for name, one in budgets.items())
         if level == coarsest and 0.5 < steps < math.inf and tolerance > _LEAST * smallest:
             tolerance = max(tolerance * _PART / steps, _LEAST * smallest)
             continue  # steps and solver would use more than half of the target
-        if all(error_of(one) <= _ROUNDING * wanted[name] for name, one in found.items()):
+        if all(error_of(one) <= _ROUNDING * wanted[name] for name, one in budgets.items()):
             break
         # neither a finer grid nor a smaller tolerance reduces the errors of other sources
-        _refuse_missed(case, targets, found, list(_REMEDIES)[0 if level == _FINEST else 2 :], cells)
+        _refuse_missed(case, targets, budgets, list(_REMEDIES)[0 if level == _FINEST else 2 :], cells)
         level -= 1
 
     path = case_path(folder, chosen.key, "result")
@@ -167,9 +169,9 @@ def choose(
         with atomic_write(path) as temporary:
             shutil.copyfile(case_path(folder / neighbours.FOLDER, chosen.key, "result"), temporary)
     reasons = [f"grid: {cells}", *reached, f"tolerance: {chosen.settings.tolerance:.2g}"]
-    if unknown := found[observed[0].name].attrs["open"]:
+    if unknown := budgets[observed[0].name].attrs["open"]:
         reasons.append(f"open, and not counted: {unknown}")
-    return chosen, reasons, found
+    return chosen, reasons, budgets
 
 
 def error_of(budget: xr.Dataset, sources: Sequence[str] | None = None) -> float:

@@ -396,8 +396,8 @@ def flux_of(dataset: xr.Dataset) -> xr.DataArray:
     stated = dataset["leak_rate"].attrs if "leak_rate" in dataset else {}
     options = {name: value for name, value in stated.items() if name in ("along", "viscosity", "pressure_drop")}
     gap = dataset[["gap"]].chunk({axis_of(dataset.variables): 1, "x": -1, "y": -1}).assign_attrs(dataset.attrs)
-    found = leakage(gap, flow=True, **options)
-    size = np.hypot(found["flux_x"], found["flux_y"]).clip(_NO_FLOW)  # zero has no logarithm
+    flow = leakage(gap, flow=True, **options)
+    size = np.hypot(flow["flux_x"], flow["flux_y"]).clip(_NO_FLOW)  # zero has no logarithm
     return size.where(gap["gap"] > 0)
 
 
@@ -590,11 +590,13 @@ def _draw_spectrum(ax: Axes, levelled: xr.DataArray, cutoff: float | None) -> No
     """Draw the radial power spectral density of the levelled heights, up to the lower limit of both axes."""
     if min(levelled.shape) >= 8 and float(levelled.std()) > 0:
         gaps = bool(levelled.isnull().any())
-        found = psd(fill(levelled.drop_attrs()) if gaps else levelled, window="hann")
-        found = found.sel(wavevector=slice(np.pi / max(spacing(levelled))))  # rings inside the square of wavevectors
-        found = found.where(found["psd"] > 1e-14 * found["psd"].max(), drop=True)  # the rest is rounding
-        q = 1e-6 * found["wavevector"]
-        density = 1e24 * found["psd"]
+        spectrum = psd(fill(levelled.drop_attrs()) if gaps else levelled, window="hann")
+        spectrum = spectrum.sel(
+            wavevector=slice(np.pi / max(spacing(levelled)))
+        )  # rings inside the square of wavevectors
+        spectrum = spectrum.where(spectrum["psd"] > 1e-14 * spectrum["psd"].max(), drop=True)  # the rest is rounding
+        q = 1e-6 * spectrum["wavevector"]
+        density = 1e24 * spectrum["psd"]
         ax.plot(q, density, lw=1)
         style.log_axis(ax.xaxis, q)
         style.log_axis(ax.yaxis, density)

@@ -190,25 +190,28 @@ def _case(job: tuple[Path | xr.Dataset, int, bool, bool]) -> dict[str, Any]:
             dataset = dataset.load()  # otherwise each frame opens the file
         case = json.loads(dataset.attrs.get("case", "{}"))
         title = str(case.get("title") or dataset.attrs.get("title") or f"case {number}")
-        found = {"title": title, "name": case_words(case) or title, "key": str(dataset.attrs.get("case_key", ""))}
-        found["cells"] = _cells(dataset)
-        return found | (_details(dataset, case, number, is_drawn) if is_shown else {})
+        facts = {"title": title, "name": case_words(case) or title, "key": str(dataset.attrs.get("case_key", ""))}
+        facts["cells"] = _cells(dataset)
+        return facts | (_details(dataset, case, number, is_drawn) if is_shown else {})
 
 
 def _details(dataset: xr.Dataset, case: dict[str, Any], number: int, is_drawn: bool) -> dict[str, Any]:
     """Return figures, assumptions and study of one case, and its surface if it is the first case or differs."""
     height = dataset.get("height", xr.DataArray())
-    found: dict[str, Any] = {"attributes": {**height.attrs, **dataset.attrs}, "text": study_text(case) if case else ""}
-    found["warnings"] = warnings_of(dataset.attrs)
-    found["figures"] = [
+    details: dict[str, Any] = {
+        "attributes": {**height.attrs, **dataset.attrs},
+        "text": study_text(case) if case else "",
+    }
+    details["warnings"] = warnings_of(dataset.attrs)
+    details["figures"] = [
         _picture(caption, figure) for _, caption, figure in figures_of(dataset, DEFAULT if is_drawn else ())
     ]
     if height.ndim and (number == 0 or varies_surface(case)):
         picture = _picture(FIGURES["surface"][2], surface(height))
-        found["surface"] = {"picture": picture, "parameters": parameters(off_plane(height.load()))[[*_PARAMETERS]]}
+        details["surface"] = {"picture": picture, "parameters": parameters(off_plane(height.load()))[[*_PARAMETERS]]}
     with suppress(InputError):  # a Dataset that lacks the variables of an audit
-        found["audit"] = list(audit_of(dataset))
-    return found
+        details["audit"] = list(audit_of(dataset))
+    return details
 
 
 def _text(value: xr.DataArray) -> str:

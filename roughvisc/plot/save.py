@@ -177,8 +177,8 @@ def in_parallel(work: Callable[[Any], Any], jobs: Sequence[Any], processes: int,
     with pool, reporting(label, lambda done, count: f"{done:.0f} of {count:.0f} cases") as report:
         results = []
         try:
-            for found in pool.map(work, jobs) if min(processes, len(jobs)) > 1 else map(work, jobs):
-                results.append(found)
+            for result in pool.map(work, jobs) if min(processes, len(jobs)) > 1 else map(work, jobs):
+                results.append(result)
                 report(len(results), len(jobs))
         except BrokenProcessPool as error:
             lost = f"{label}: a process was killed, perhaps because the memory was full: expected more free memory"

@@ -257,14 +257,14 @@ def _draw_line(ax: Axes, line: pd.DataFrame, look: dict[str, Any], *, joined: bo
     # realisations with times of their own are interpolated to common times
     wide = line.pivot_table("shown", "across", REALISATION).interpolate("index", limit_area="inside").dropna()
     itself = wide.pop(ITSELF) if ITSELF in wide and wide.shape[1] > 1 else None
-    found = statistics(wide.to_numpy().T)
-    ends = wide.index, found["patch_lower"], found["patch_upper"]
+    summary = statistics(wide.to_numpy().T)
+    ends = wide.index, summary["patch_lower"], summary["patch_upper"]
     band = {"color": look["color"], "label": f"mean and 95 % prediction interval, {wide.shape[1]} realisations"}
     if joined and len(wide) > 1:
         ax.fill_between(*ends, alpha=0.22, lw=0, **band)
     else:
         ax.vlines(*ends, alpha=0.35, lw=5, **band)
-    ax.plot(wide.index, found["mean"], **look)
+    ax.plot(wide.index, summary["mean"], **look)
     if itself is not None:
         dashed = {"marker": "D", "mfc": "w", "ms": 4, "lw": 1.1, "ls": "--" if joined else "", "label": "measured scan"}
         ax.plot(itself.index, itself, **(look | dashed))

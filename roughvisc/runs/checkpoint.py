@@ -184,7 +184,9 @@ class CheckpointWriter(Recorder):
         first = self._ends[-1]
         if first == len(self.plain):
             return
-        arrays = {f"{row}/{name}": one for row, found in enumerate(self._arrays, first) for name, one in found.items()}
+        arrays = {
+            f"{row}/{name}": one for row, variables in enumerate(self._arrays, first) for name, one in variables.items()
+        }
         _write(self._rows_path(len(self._ends) - 1), self.plain[first:], arrays)
         self._ends = [*self._ends, len(self.plain)]
         self._arrays = []

@@ -135,8 +135,8 @@ def require_same_version(client: Client) -> None:
         If a version differs; the message states the address of the worker and both versions.
     """
     here = metadata.version("roughvisc")
-    for address, found in client.get_versions(packages=["roughvisc"])["workers"].items():
-        version = found["packages"].get("roughvisc")
+    for address, about in client.get_versions(packages=["roughvisc"])["workers"].items():
+        version = about["packages"].get("roughvisc")
         if version != here:
             raise InputError(key=f"worker {address}", found=version, expected=f"roughvisc {here}, as in this process")
 

@@ -62,8 +62,8 @@ def result_files(folder: Path) -> list[Path]:
 
 def no_results(folder: Path) -> InputError:
     """Return the error of a path that is not a folder with results."""
-    found = "holds no results" if folder.is_dir() else "is a file" if folder.exists() else "does not exist"
-    return InputError(f"{folder}: {found}: expected a folder with results (.nc), as roughvisc run writes them")
+    state = "holds no results" if folder.is_dir() else "is a file" if folder.exists() else "does not exist"
+    return InputError(f"{folder}: {state}: expected a folder with results (.nc), as roughvisc run writes them")
 
 
 def results_at(place: Path) -> list[Path]:
@@ -209,8 +209,8 @@ def clean_folder(folder: str | Path, *, everything: bool = False) -> list[Path]:
 
     keys: dict[str, None] = {}
     for path in sorted(folder.iterdir()):
-        if found := _OF_A_CASE.match(path.name):
-            keys[found[1]] = None
+        if match := _OF_A_CASE.match(path.name):
+            keys[match[1]] = None
         elif path.match(".*.part*"):
             with suppress(OSError):
                 if time.time() - path.stat().st_mtime > _ABANDONED:

@@ -379,8 +379,8 @@ def save_result(dataset: xr.Dataset, path: str | Path, *, gap_part: float | None
         raise InputError(key="path", found=str(path), expected="a name that ends in .nc")
     declared = isinstance(dataset, xr.Dataset) and all(name in VARIABLES for name in dataset.data_vars)
     if not declared or not set(AXES) & set(dataset.dims) or "case" in dataset.dims:
-        found = list(dataset.sizes) if isinstance(dataset, xr.Dataset) else dataset
-        raise InputError(key="dataset", found=found, expected="a result of one case, as from rv.simulate")
+        given = list(dataset.sizes) if isinstance(dataset, xr.Dataset) else dataset
+        raise InputError(key="dataset", found=given, expected="a result of one case, as from rv.simulate")
     if gap_part is not None:
         dataset = _with_rounded_gap(dataset, number(gap_part, "1", "gap_part", above=0, most=1))
     return write_result(dataset, path)
@@ -398,20 +398,22 @@ def _with_rounded_gap(dataset: xr.Dataset, part: float) -> xr.Dataset:
     rounded = np.divide(gap.values, steps, where=steps > 0, out=gap.values.copy())
     rounded = np.where(steps > 0, np.round(rounded) * steps, gap.values)
     stated = gap.attrs | {"rounding": f"at most {part:g} of approach_error"}
-    found = dataset.assign(gap=(gap.dims, rounded, stated))
-    found.encoding = dataset.encoding
-    return found
+    packed = dataset.assign(gap=(gap.dims, rounded, stated))
+    packed.encoding = dataset.encoding
+    return packed
 
 
 def _declare(place: netCDF4.Dataset, part: xr.Dataset) -> list[tuple[netCDF4.Variable, xr.Variable]]:
     """Declare the variables of a file or a group; return each with the values to write."""
     place.setncatts(_readable(part.attrs))
     declared = []
+    coordinates = {*part.coords}
+    labels = [name for name in part.coords if name not in part.dims]
     for name, variable in part.variables.items():
         attributes = dict(variable.attrs)
-        if name in part.data_vars:  # CF names its coordinates in an attribute
-            for label_name, one in part.coords.items():
-                if label_name not in part.dims and set(one.dims) <= set(variable.dims):
+        if name not in coordinates:  # CF names its coordinates in an attribute
+            for label_name in labels:
+                if set(part.variables[label_name].dims) <= set(variable.dims):
                     attributes["coordinates"] = f"{attributes.get('coordinates', '')} {label_name}".lstrip()
         if variable.dtype.kind == "U":
             # characters along a dimension, as xarray and CF read text: netCDF4 1.7.5 crashes on strings of any length

@@ -256,11 +256,13 @@ def is_result_of(case: Case, path: Path) -> bool:
         return False
     try:
         with open_result(path) as dataset:
-            found = dataset.attrs.get("case_key")
+            stored_key = dataset.attrs.get("case_key")
     except DamagedError:
         return False
-    if found != case.key:
-        raise unusable(path, f"holds the result of case {found}", f"the result of case {case.key}, as its name says")
+    if stored_key != case.key:
+        raise unusable(
+            path, f"holds the result of case {stored_key}", f"the result of case {case.key}, as its name says"
+        )
     return True
 
 

@@ -206,8 +206,8 @@ def run_cases(
             display.ended(outcome)
         warned = set[str]()
         try:
-            with closing(_computed(todo, folder, display, client, workers, threads)) as found:
-                for outcome in found:
+            with closing(_computed(todo, folder, display, client, workers, threads)) as computed:
+                for outcome in computed:
                     outcomes[outcome.key] = outcome
                     _record(outcome, distinct[outcome.key], folder)
                     display.ended(outcome)

@@ -141,8 +141,8 @@ def _plain(attributes: Mapping[Any, Any]) -> dict[str, Any]:
 
 
 def _stamp(path: Path) -> list[int]:
-    found = path.stat()
-    return [found.st_size, found.st_mtime_ns]
+    status = path.stat()
+    return [status.st_size, status.st_mtime_ns]
 
 
 def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
@@ -259,19 +259,19 @@ def read_sweep(folder: Path) -> dict[str, dict[str, Any]]:
     except InputError:
         raise
     except DAMAGED as error:
-        found = f"is damaged ({error})"
-        raise InputError(f"{path}: {found}: expected the cases of a sweep; run it again", key=SWEEP) from error
+        flaw = f"is damaged ({error})"
+        raise InputError(f"{path}: {flaw}: expected the cases of a sweep; run it again", key=SWEEP) from error
 
 
 def numbers_of(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, int]:
     """Return the number of each case, from 0 in their order; the realisations of one case share its number."""
     numbers: dict[str, int] = {}
-    found = {}
+    number_of = {}
     for key, case in cases.items():
         varied = case.get("varied", {})
         settings = json.dumps({name: one for name, one in varied.items() if name not in (REALISATION, *DRAWN)})
-        found[key] = numbers.setdefault(settings if REALISATION in varied else key, len(numbers))
-    return found
+        number_of[key] = numbers.setdefault(settings if REALISATION in varied else key, len(numbers))
+    return number_of
 
 
 def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.Dataset:
@@ -325,8 +325,8 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.
         raise no_results(folder)
     entries = [index[key] for key in listed if key in index]
     if len(axes := {entry.along: entry.file for entry in entries}) > 1:
-        found = ", ".join(f"{file} over {along}" for along, file in axes.items())
-        raise InputError(f"{folder}: found {found}: expected results over one axis; give cases", key="cases")
+        listing = ", ".join(f"{file} over {along}" for along, file in axes.items())
+        raise InputError(f"{folder}: found {listing}: expected results over one axis; give cases", key="cases")
     numbers = numbers_of(listed)
     keys = [entry.key for entry in entries]
     parameters = {name: values[here] for name, values in parameters_of([*listed.values()]).items()}
@@ -334,9 +334,9 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | None = None) -> xr.
         "case": (("case",), np.array([numbers[key] for key in keys]), {"long_name": "number of the case"}),
         CASE_KEY: (("case",), np.array(keys), VARIABLES[CASE_KEY].attributes),
     }
-    found = _by_realisation(_stacked(folder, entries).assign_coords(labels), parameters)
-    found.encoding[CARRIED] = _Steps(folder)
-    return found
+    results = _by_realisation(_stacked(folder, entries).assign_coords(labels), parameters)
+    results.encoding[CARRIED] = _Steps(folder)
+    return results
 
 
 @dataclass
@@ -452,7 +452,7 @@ def _by_realisation(flat: xr.Dataset, parameters: Mapping[str, NDArray[Any]]) ->
     texts = {name: "" for name, one in flat.variables.items() if one.dtype.kind in "UO"}
     runs = flat.drop_vars(["case", REALISATION, *settings]).rename_dims(case="run")
     runs = runs.assign_coords(xr.Coordinates.from_pandas_multiindex(pairs, "run"))
-    found = runs.unstack("run", fill_value=texts).transpose("case", REALISATION, ...)
-    found = found.assign_coords({name: of_cases.variables[name] for name in settings})
-    found[REALISATION].attrs["comment"] = "another patch of the same roughness; 0: the measured surface itself"
-    return found
+    unstacked = runs.unstack("run", fill_value=texts).transpose("case", REALISATION, ...)
+    unstacked = unstacked.assign_coords({name: of_cases.variables[name] for name in settings})
+    unstacked[REALISATION].attrs["comment"] = "another patch of the same roughness; 0: the measured surface itself"
+    return unstacked
