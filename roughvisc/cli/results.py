@@ -144,9 +144,11 @@ def audit(result: Path, **properties: Any) -> None:
     from roughvisc.cli.study_tables import audit_table
     from roughvisc.judge.audit import audit_of
     from roughvisc.runs.folder import results_at
+    from roughvisc.runs.sweep_data import numbers_of, read_sweep
 
     given = {name: value for name, value in properties.items() if value is not None}
-    for path in results_at(result):
+    numbers = numbers_of(read_sweep(result)) if result.is_dir() else {}
+    for path in sorted(results_at(result), key=lambda path: numbers.get(path.stem, len(numbers))):
         with rv.open_result(path) as dataset:
             screen().print(audit_table(audit_of(dataset, **given)), "", sep="\n")
 

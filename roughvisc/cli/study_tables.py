@@ -132,7 +132,7 @@ def trade_table(dataset: xr.Dataset, quantity: str, target: float) -> Group:
     ]
     if dataset.attrs["grid_is_data"]:
         lines.append(
-            f"The {wanted} do not contain the error from the spacing, {by_grid} %: a scan with closer points has less."
+            f"This does not include the error from the spacing, {by_grid} %, which a scan with closer points reduces."
         )
     return titled(dataset.attrs["title"], columns(headings, rows, ("setting",)), *map(Text, lines))
 
@@ -192,7 +192,8 @@ def _case_table(costs: xr.Dataset) -> Any:
         known = [_estimate(float(row[name]), str(row[name].attrs.get("units", ""))) for name in _COSTS]
         numbers = ["cannot run"] if row["refusal"] != "" else [text and mark + text for text in known]
         rows.append([*(value_text(key, row[key].item()) for key in varied), *numbers])
-    return columns([*names_of(varied).values(), *(name.replace("_", " ") for name in _COSTS)], rows)
+    names = [f"{name[:1].lower()}{name[1:]}" for name in names_of(varied).values()]
+    return columns([*names, *(name.replace("_", " ") for name in _COSTS)], rows)
 
 
 def _estimate(value: float, unit: str) -> str:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 def columns(headings: Sequence[str], rows: Iterable[Sequence[Any]], left: Sequence[str] = ()) -> Table:
     """Return rows of numbers and texts under their headings; some columns are aligned to the left."""
-    table = Table(box=None, pad_edge=False, collapse_padding=True)
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for heading in headings:
         table.add_column(Text(heading), justify="left" if heading in left else "right", overflow="fold")
     for row in rows:

@@ -30,6 +30,7 @@ from roughvisc.runs.run import result_folder
 from roughvisc.runs.sweep import run_one
 from roughvisc.solve import Progress
 from roughvisc.study.case import Case, case_given
+from roughvisc.study.case_text import case_words
 from roughvisc.study.properties import properties
 from roughvisc.topography.borders import border_mismatch
 from roughvisc.topography.framing import mirror
@@ -159,7 +160,8 @@ class AuditedContact:
     @cached_property
     def fullest(self) -> xr.Dataset:
         """Row with the largest force; among equal forces the last row with the largest contact area."""
-        force, area = self.dataset["force"].values, self.dataset["contact_area"].values
+        force = self.dataset["force"].values
+        area = self.dataset["contact_area"].values
         ranks = np.lexsort((np.nan_to_num(area), force >= force.max() * (1 - _ROUNDING)))  # NaN: not solved
         return self.dataset.isel({axis_of(self.dataset): ranks[-1]})
 
@@ -277,7 +279,9 @@ def adhesion(scene: AuditedContact) -> Found:
     if "range_of_adhesion" in scene.dataset.attrs:
         w, reach = (scene.dataset.attrs[f"{name}_of_adhesion"] for name in ("work", "range"))
         return 0.0, f"Modelled: {as_text(w, 'J/m^2', 3)} with a range of {as_text(reach, 'm', 3)}."
-    force, curvature, fraction = scene.force, scene.curvature, float(scene.fullest["contact_fraction"])
+    force = scene.force
+    curvature = scene.curvature
+    fraction = float(scene.fullest["contact_fraction"])
     if scene.boundary != "free" and fraction > _MERGED:
         raise NotKnown(f"{percent(fraction)} of the area is in contact, without separate spots.")
     if not curvature * _FLAT * scene.half_width > 1:
@@ -329,11 +333,14 @@ def inertia(scene: AuditedContact) -> Found:
     :math:`V^2 / (c^2 - V^2)`. Up to 0.7 ``c`` this is 0.85 to 1.4 times the exact increase for any Poisson ratio from
     0 to 0.5.
     """
-    width, scale, speed = scene.half_width, float(scene.facts["time_scale"]), scene.slide[0]
+    width = scene.half_width
+    scale = float(scene.facts["time_scale"])
+    speed = scene.slide[0]
     [density] = scene.need("density")
     shear = (1 - float(scene.facts.get("poisson", _SOFTEST))) / (2 * scene.late)
     waves = math.sqrt(shear / density)
-    lag, excess = 0.85 * width / waves, speed**2 / (waves**2 - speed**2) if speed < waves else math.inf
+    lag = 0.85 * width / waves
+    excess = speed**2 / (waves**2 - speed**2) if speed < waves else math.inf
     if excess > lag / scale:
         slides = f"the profile slides at {as_text(speed, 'm/s')}"
         return excess, f"Shear waves travel at {as_text(waves, 'm/s')}, and {slides}."
@@ -354,7 +361,9 @@ def heating(scene: AuditedContact) -> Found:
     if "temperature" in scene.dataset:
         warmest = float(scene.dataset["temperature"].max())
         return 0.0, f"Modelled: the contact is warmed up to {warmest:.4g} K."
-    spots, area, heat = spot_count(scene.pressure_in(rubbed)), float(rubbed["contact_area"]), max(power, 0.0)
+    spots = spot_count(scene.pressure_in(rubbed))
+    area = float(rubbed["contact_area"])
+    heat = max(power, 0.0)
     conductivity, capacity = scene.need("heat_conductivity", "volumetric_heat_capacity")
     radius = math.sqrt(area / (math.pi * spots))
     rise = surface_rise(heat / area, radius, speed, conductivity, capacity)
@@ -392,7 +401,7 @@ def border(scene: AuditedContact) -> Found:
         return 0.0, "The surface repeats with its mirror images: its borders meet."
     number = max(border_mismatch(scene.height))
     advice = "" if number < LIMITS["border"].doubtful else ' Use boundary = "mirror".'
-    return number, f"Opposite borders differ {number:.2g} times as much as neighbouring rows.{advice}"
+    return number, f"The difference of opposite borders is {number:.2g} times that of neighbouring rows.{advice}"
 
 
 def _periodic_relief(scene: AuditedContact, sheet: Sheet) -> float:
@@ -593,16 +602,16 @@ def audit(
     if not isinstance(result, xr.Dataset):
         case = case_given(result, "result")
         result = open_result(run_one(case, result_folder(case, out), progress=progress, threads=threads))
-    found = audit_of(result, **stated)
+    findings = audit_of(result, **stated)
     columns = {
-        "verdict": ("verdict", [one.verdict for one in found]),
-        "number": ("number that is compared with the limits", [one.number for one in found]),
-        "doubtful": ("number from which the assumption is doubtful", [one.limit.doubtful for one in found]),
-        "broken": ("number from which the assumption is broken", [one.limit.broken for one in found]),
-        "sentence": ("meaning of the number", [one.sentence for one in found]),
+        "verdict": ("verdict", [one.verdict for one in findings]),
+        "number": ("number that is compared with the limits", [one.number for one in findings]),
+        "doubtful": ("number from which the assumption is doubtful", [one.limit.doubtful for one in findings]),
+        "broken": ("number from which the assumption is broken", [one.limit.broken for one in findings]),
+        "sentence": ("meaning of the number", [one.sentence for one in findings]),
     }
     variables = {name: ("assumption", values, {"long_name": text}) for name, (text, values) in columns.items()}
-    return xr.Dataset(variables, {"assumption": [one.name for one in found]}, {"title": found.title})
+    return xr.Dataset(variables, {"assumption": [one.name for one in findings]}, {"title": findings.title})
 
 
 def audit_of(result: xr.Dataset, **given: Any) -> Audit:
@@ -615,12 +624,17 @@ def audit_of(result: xr.Dataset, **given: Any) -> Audit:
         source = result.encoding.get("source")
         case = Case.from_json(result.attrs["case"], Path(source).parent if source else None)
         given = {**case.audit_inputs, **given}
-    scene, findings = AuditedContact(result, given, case), []
+    scene = AuditedContact(result, given, case)
+    findings = []
     for name, limit in LIMITS.items():
         try:
-            found = limit.check(scene)
+            checked = limit.check(scene)
         except NotKnown as missing:
-            found = math.nan, str(missing)
-        if found is not None:
-            findings.append(Finding(name, *found, limit))
-    return Audit(str(result.attrs.get("title", "")), tuple(findings))
+            checked = math.nan, str(missing)
+        if checked is not None:
+            findings.append(Finding(name, *checked, limit))
+    title = str(result.attrs.get("title", ""))
+    if case is not None and case.varied:
+        words = case_words({"varied": dict(case.varied)})
+        title = f"{case.title}, {words[:1].lower()}{words[1:]}"
+    return Audit(title, tuple(findings))

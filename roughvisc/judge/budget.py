@@ -48,8 +48,12 @@ Observe = Mapping[str, Mapping[str, Any]]
 KNOWN = ("modulus_error", "time_scale_error", "cutoff", "population")
 #: Folder of the further solves of a budget, in the folder of the results.
 FOLDER = "budget"
-STEPS, GRID, SAMPLE, OCTAVE = "time steps and solver", "grid", "sample", "next octave of waves"
-MODULUS, TIME_SCALE = "modulus", "time scale"
+STEPS = "time steps and solver"
+GRID = "grid"
+SAMPLE = "sample"
+OCTAVE = "next octave of waves"
+MODULUS = "modulus"
+TIME_SCALE = "time scale"
 #: Recipes that give the same surface on any grid.
 _ANY_GRID = ("sphere", "cone", "flat_punch", "wavy")
 #: Relative change of a modulus or a time scale, for the derivative of a number.
@@ -59,7 +63,8 @@ GRID_SAFETY = 3.0
 #: Number of other patches, and half-width of the logarithm at 95 % over its standard deviation. For six patches
 #: Student's factor is 2.57. A larger factor is used, because all patches have the spectrum of one patch, whose longest
 #: waves vary from patch to patch.
-_PATCHES, _SAMPLE_FACTOR = 6, 3.3
+_PATCHES = 6
+_SAMPLE_FACTOR = 3.3
 #: Largest ratio of two shortest wavelengths that count as equal: the wavelength above which 99 % of the slope lie, and
 #: the shortest wavelength of the spectrum.
 _SAME = 1.15
@@ -102,8 +107,8 @@ class Observable:
 
     def of(self, result: xr.Dataset, case: Case) -> Array:
         """Return the values of the number in a result of a case, over the axis."""
-        found = result[self.name] if self.derive is None else self.derive(result, case.observed)
-        return np.asarray(found.values, dtype=float)
+        values = result[self.name] if self.derive is None else self.derive(result, case.observed)
+        return np.asarray(values.values, dtype=float)
 
     def stated_error(self, result: xr.Dataset, values: Array) -> Array:
         """Return the error of the number's logarithm by steps and solver, from the stated errors of the rows. [-]
@@ -124,11 +129,11 @@ class Observable:
 
 
 def _thermal_conductance(result: xr.Dataset, observe: Observe) -> xr.DataArray:
-    found = conductance(result, **observe.get("conductance", {"resistivity": (1.0, 1.0)}))
-    if "thermal_conductance" not in found:
+    conductances = conductance(result, **observe.get("conductance", {"resistivity": (1.0, 1.0)}))
+    if "thermal_conductance" not in conductances:
         expected = "a study that observes a thermal conductance, not an electrical one"
         raise InputError(key="quantity", found="thermal_conductance", expected=expected)
-    return found["thermal_conductance"]
+    return conductances["thermal_conductance"]
 
 
 def _leak_rate(result: xr.Dataset, observe: Observe) -> xr.DataArray:
@@ -302,16 +307,21 @@ def coarser_grids(base: Case, height: xr.DataArray, coarsening: float) -> tuple[
     coarsening : float
         Length of the cells whose error is wanted, over the length of the cells of the case.
     """
-    cell, is_limited = coarsening * max(spacing(height)), is_sample(base, height)
+    cell = coarsening * max(spacing(height))
+    is_limited = is_sample(base, height)
     wave = max(shortest_wave(height), 2 * cell) if is_limited else math.inf
-    fine, before, found = on_cells(base, height, coarsening), wave, []
+    fine = on_cells(base, height, coarsening)
+    before = wave
+    coarser = []
     for part in (2.0, 4.0):  # two grids may agree by chance
-        coarse, shortest = on_cells(base, height, part * coarsening), max(wave, 2 * part * cell)
+        coarse = on_cells(base, height, part * coarsening)
+        shortest = max(wave, 2 * part * cell)
         against = changed(fine, {"surface.shortest_wave": shortest}) if shortest > _SAME * before else fine
         longer = shortest / wave if is_limited else 1.0
-        found.append(Neighbour(coarse, GRID_SAFETY, against, longer / part, longer))
-        fine, before = coarse, shortest
-    return tuple(found)
+        coarser.append(Neighbour(coarse, GRID_SAFETY, against, longer / part, longer))
+        fine = coarse
+        before = shortest
+    return tuple(coarser)
 
 
 def sources_of(
@@ -340,32 +350,38 @@ def sources_of(
     cutoff = known.get("cutoff")
     if cutoff is not None:
         cutoff = number(cutoff, "m", "cutoff", above=0)
-    sample, others = is_sample(base, height), others or coarsening
+    sample = is_sample(base, height)
+    others = others or coarsening
     grids = coarser_grids(base, height, coarsening)
     own, coarse = (on_cells(base, height, part * others) for part in (1.0, 2.0))
-    found = {STEPS: Source("errors that the result states"), GRID: Source("cells twice and four times as long", grids)}
+    sources = {
+        STEPS: Source("errors that the result states"),
+        GRID: Source("cells twice and four times as long", grids),
+    }
 
     if sample and population == "ensemble":
         few = [max(2, round(n / (2 * others))) for n in height.shape]
         patches = [changed(base, {"surface.resample": few, "surface.realisation": n + 1}) for n in range(_PATCHES)]
         near = tuple(Neighbour(patch, _SAMPLE_FACTOR, coarse) for patch in patches)
-        found[SAMPLE] = Source(f"{_PATCHES} Gaussian surrogates on cells twice as long", near)
+        sources[SAMPLE] = Source(f"{_PATCHES} Gaussian surrogates on cells twice as long", near)
     if sample and cutoff is None:
-        found[OCTAVE] = Source("cutoff is not given: the shortest wavelength that the real surface has", is_open=True)
+        sources[OCTAVE] = Source("cutoff is not given: the shortest wavelength that the real surface has", is_open=True)
     elif sample:
         assert cutoff is not None
-        end, shortest = unit_for(cutoff, "m").text(cutoff, 3), shortest_wave(height)
-        found[OCTAVE] = Source(f"the grid holds all waves down to {end}")
+        end = unit_for(cutoff, "m").text(cutoff, 3)
+        shortest = shortest_wave(height)
+        sources[OCTAVE] = Source(f"the grid holds all waves down to {end}")
         if is_narrow_band(height):
-            found[OCTAVE] = Source("the surface has waves of one length, and no shorter ones")
+            sources[OCTAVE] = Source("the surface has waves of one length, and no shorter ones")
         elif shortest >= _SAME * cutoff:
             octaves = math.log2(shortest / cutoff)
             words = f"without the shortest octave; {octaves:.2g} octaves down to {end} are missing"
             smooth = changed(own, {"surface.shortest_wave": 2 * shortest})
-            found[OCTAVE] = Source(words, (Neighbour(smooth, octaves, own),))
+            sources[OCTAVE] = Source(words, (Neighbour(smooth, octaves, own),))
 
     # the contact of an indenter has few cells, so changes of its material are solved on the grid of the case
-    compared, material = coarse if sample else own, base.tables["material"]
+    compared = coarse if sample else own
+    material = base.tables["material"]
     stiffer: dict[str, Any] = {"material.modulus_factor": _CHANGE * material.get("modulus_factor", 1.0)}
     slower: dict[str, Any] = {f"material.{key}": None for key in split_thermal(material)[0]}
     slower["material.shift_factor"] = _CHANGE * shift_factor(material)
@@ -376,14 +392,14 @@ def sources_of(
             error = number(error, "1", key, least=0, below=1)
         if name == TIME_SCALE and not creeps:
             continue
-        found[name] = Source(f"{what} are exact")
+        sources[name] = Source(f"{what} are exact")
         if error is None:
-            found[name] = Source(f"{key} is not given: the relative error of the {what}", is_open=True)
+            sources[name] = Source(f"{key} is not given: the relative error of the {what}", is_open=True)
         elif error > 0:
             weight = math.log1p(error) / math.log(_CHANGE)
             one = Neighbour(changed(compared, changes), weight, compared)
-            found[name] = Source(f"{what} {100 * (_CHANGE - 1):.0f} % larger", (one,))
-    return found
+            sources[name] = Source(f"{what} {100 * (_CHANGE - 1):.0f} % larger", (one,))
+    return sources
 
 
 # ----------------------------------------------------------------------------------------------------------------
@@ -482,7 +498,9 @@ def _budget(
     case: Case, sources: Mapping[str, Source], quantity: Observable, rows: Mapping[str, xr.Dataset]
 ) -> xr.Dataset:
     """Return the budget of a quantity from the results of a case and its neighbours, at the same rows."""
-    own, axis, units = rows[case.key], case.experiment.axis, VARIABLES[quantity.name].units
+    own = rows[case.key]
+    axis = case.experiment.axis
+    units = VARIABLES[quantity.name].units
     values = {key: quantity.of(result, case) for key, result in rows.items()}
     value = values[case.key]
     half_width, direction = np.zeros((2, len(sources), value.size))
@@ -622,11 +640,12 @@ def budget(
     finished = case_path(result_folder(case), case.key, "result")
     folder = path_of(out, "out").expanduser() if out is not None else finished.parent / FOLDER
     observed = [quantity_of(case, name) for name in names]
-    base, own = with_kept(case, [field for one in observed for field in one.fields]), None
+    base = with_kept(case, [field for one in observed for field in one.fields])
+    own = None
     if set(base.settings.fields) <= set(case.settings.fields) and is_result_of(case, finished):
         own = open_result(finished)
     computing = {"progress": progress, "client": client, "workers": workers, "threads": threads}
-    found = compared(base, sources_of(base, base.height(), known), observed, folder, own, **computing)
+    budgets = compared(base, sources_of(base, base.height(), known), observed, folder, own, **computing)
     if isinstance(quantity, str):
-        return found[quantity]
-    return xr.concat(list(found.values()), "quantity", combine_attrs="drop_conflicts")
+        return budgets[quantity]
+    return xr.concat(list(budgets.values()), "quantity", combine_attrs="drop_conflicts")

@@ -55,13 +55,17 @@ UNITS = dict.fromkeys(("cells_x", "cells_y", "steps", "rows", "contact_fraction"
 UNITS |= {"nominal_pressure": "Pa", "wall_time": "s", "memory": "byte", "disk": "byte"}
 TEXTS = ("model", "note", "warning", "refusal")
 #: Longest side of the grid of a coarse run, of a loading and of a friction curve. [cells]
-_COARSE, _COARSE_CURVE = 128, 48
+_COARSE = 128
+_COARSE_CURVE = 48
 #: Exponents with which steps, and convolutions of loadings and of friction curves, grow with the number of cells a
 #: side. On 15 measured cases of rough surfaces, balls, slides and curves, of 96 to 512 cells a side, the exponent of
 #: convolutions is 0.25 to 0.65, under a prescribed approach 0.9, and for curves 0.15.
-_STEPS_GROW, _WORK_GROWS, _CURVE_GROWS = 0.1, 0.4, 0.15
+_STEPS_GROW = 0.1
+_WORK_GROWS = 0.4
+_CURVE_GROWS = 0.15
 #: Largest numbers of convolutions and steps of a coarse run. A time limit would depend on the load of the machine.
-_MOST_CONVOLUTIONS, _MOST_STEPS = 2500, 500
+_MOST_CONVOLUTIONS = 2500
+_MOST_STEPS = 500
 #: Largest number of speeds of a coarse friction curve, spread evenly over the speeds of the case.
 _FEW_SPEEDS = 7
 #: First step of a hold over the length of the hold. Later steps grow in proportion to the time.
@@ -69,12 +73,15 @@ _FIRST_STEP = 0.005
 #: Iterations of a timed solve.
 _ITERATIONS = 3
 #: Time for the coarse runs of a sweep: this time, or this part of the expected time of all cases. [s, 1]
-_BUDGET, _SHARE = 1.2, 0.05
+_BUDGET = 1.2
+_SHARE = 0.05
 #: Contact fraction above which a number in a wrong unit is likely.
 _MOST_CONTACT = 0.9
 #: Time of the rest of a step, and of each exponential in a step, over the time of a convolution. Time per convolution
 #: of a friction curve over the time of a convolution of a contact problem, at 256 and 1024 cells a side.
-_STEP, _EXPONENTIAL, _CURVE_CONVOLUTION = 2.0, 0.4, 2.1
+_STEP = 2.0
+_EXPONENTIAL = 0.4
+_CURVE_CONVOLUTION = 2.1
 #: Work of the run on a coarser grid for the grid error, over the work of the run. [-]
 _GRID_ERROR = 0.3
 #: Size of the file of a friction curve, a loading and a loading with slides, without the values of variables. [byte]
@@ -140,15 +147,18 @@ def plan(
     """
     cases = cases_given(cases)
     count("workers", workers, 0)
-    folder, there = result_folder(cases[0], out), memory_available(cases[0].settings.device)
+    folder = result_folder(cases[0], out)
+    there = memory_available(cases[0].settings.device)
     stated = [json.loads(case.to_json()) for case in cases]
     parameters = parameters_of(stated)
     surfaces: dict[str, tuple[xr.DataArray, float]] = {}
     runs: dict[int, CoarseRun] = {}
     rows: list[dict[str, Any]] = [{}] * len(cases)
-    began, expected = time.thread_time(), 0.0
+    began = time.thread_time()
+    expected = 0.0
     for number in sorted(range(len(cases)), key=lambda one: f"{one:b}"[::-1]):  # spread over the sweep: 0, 4, 2, 1, 3
-        case, is_own = cases[number], not runs or time.thread_time() - began < max(_BUDGET, _SHARE * expected)
+        case = cases[number]
+        is_own = not runs or time.thread_time() - began < max(_BUDGET, _SHARE * expected)
         row = dict.fromkeys(UNITS, np.nan) | dict.fromkeys(TEXTS, "") | {"marched": is_own}
         # surfaces that differ only in their seed have equal costs
         surface = json.dumps({**stated[number]["surface"], "seed": None}, sort_keys=True)
@@ -223,23 +233,33 @@ def coarse_run(own: Rows, case: Case) -> CoarseRun:
     case : Case
         The case.
     """
-    settings, experiment = replace(case.settings, fields=(), grid_error=False), case.experiment
-    few, height, share = coarse_surface(own), solved(own), 1.0
+    settings = replace(case.settings, fields=(), grid_error=False)
+    experiment = case.experiment
+    few = coarse_surface(own)
+    height = solved(own)
+    share = 1.0
     program = own.scene.program if isinstance(own, LoadingRows) else None
     if program is not None:
         settings = replace(settings, edge="accept", missing="absent")
     elif isinstance(experiment, SteadySliding):
         speeds = np.sort(experiment.speeds)
         chosen = speeds[:: math.ceil(speeds.size / _FEW_SPEEDS)]
-        experiment, share = replace(experiment, speeds=chosen), chosen.size / speeds.size
+        experiment = replace(experiment, speeds=chosen)
+        share = chosen.size / speeds.size
 
     spent = np.zeros((2, 2))  # steps and convolutions at rest, and in slides
-    kept, contact, largest, force, before = 0, list[float](), 0.0, 0.0, 0.0
+    kept = 0
+    contact = list[float]()
+    largest = 0.0
+    force = 0.0
+    before = 0.0
     with fft.set_workers(1):
         rows = experiment.rows(Problem(few, case.body, settings))
         began = time.thread_time()
         for row in rows:
-            slides, total = False, before  # inside a pair of steps: its convolutions are counted at its end
+            # inside a pair of steps: its convolutions are counted at its end
+            slides = False
+            total = before
             if program is None:
                 total += row.values["convolutions"]
             else:
@@ -247,26 +267,33 @@ def coarse_run(own: Rows, case: Case) -> CoarseRun:
                 if row.state is not None:
                     total = row.state.march.convolutions
             spent[int(slides)] += 1.0, total - before
-            before, kept = total, kept + bool(row.values and row.kept)
+            before = total
+            kept = kept + bool(row.values and row.kept)
             if row.values:
                 fraction = float(np.nan_to_num(row.values["contact_fraction"]))
-                largest, force = max(largest, fraction), float(np.fmax(force, row.values["force"]))
+                largest = max(largest, fraction)
+                force = float(np.fmax(force, row.values["force"]))
                 if row.kept or slides:  # corners alone do not represent the kept times of a slide
                     contact.append(fraction)
             if program is not None and (total > _MOST_CONVOLUTIONS or spent[:, 0].sum() > _MOST_STEPS):
-                share, compliance = _part_done(program, row.at), case.body.material.contact_compliance
+                share = _part_done(program, row.at)
+                compliance = case.body.material.contact_compliance
                 rest = sum(one.duration for one in program.segments if one.slide is None)
-                now, end = float(compliance(min(row.at, rest))), float(compliance(rest))
+                now = float(compliance(min(row.at, rest)))
+                end = float(compliance(rest))
                 if force * now > 0:  # further loading, and creep except in slides
                     largest = scaled_contact(largest, max(program.largest_load * end / (force * now), 1.0))
                 break
-        seconds, beyond = (time.thread_time() - began) / max(before, 1.0), 0.0
+        seconds = (time.thread_time() - began) / max(before, 1.0)
+        beyond = 0.0
         if height.size > few.size:
             touching = float(np.mean([*contact, largest]))
             beyond = max(timed_convolution(own, touching) - timed_convolution(rows, touching), 0.0)
 
-    octaves, kept_part = max(math.log2(height.size / few.size) / 2, 0.0), kept / max(spent[:, 0].sum(), 1.0)
-    still, moving = spent[0] / share, spent[1]
+    octaves = max(math.log2(height.size / few.size) / 2, 0.0)
+    kept_part = kept / max(spent[:, 0].sum(), 1.0)
+    still = spent[0] / share
+    moving = spent[1]
     if isinstance(own, LoadingRows):
         cells = sum(one.slide.cells(spacing(few)) for one in own.scene.program.segments if one.slide is not None)
         step = moving / moving[0] if moving[0] else still / max(still[0], 1.0)
@@ -275,7 +302,8 @@ def coarse_run(own: Rows, case: Case) -> CoarseRun:
         steps, work = (still * 2.0 ** (octaves * growth) + moving * 2.0**octaves).tolist()
         dearer = work + steps * (_STEP + _EXPONENTIAL * own.scene.memory.times.size)
     else:
-        steps, work = still[0], still[1] * 2 ** (_CURVE_GROWS * octaves)
+        steps = still[0]
+        work = still[1] * 2 ** (_CURVE_GROWS * octaves)
         dearer = work * _CURVE_CONVOLUTION
     slope = rms_slope(height)
     touched = scaled_contact(largest, rms_slope(few) / slope) if slope > 0 else largest
@@ -356,12 +384,14 @@ def _part_done(program: Program, now: float) -> float:
     for began, segment in zip(program.corners, program.segments, strict=False):
         if segment.slide is not None or segment.duration == 0:
             continue
-        part, weight = min(max(now - began, 0.0) / segment.duration, 1.0), 1.0
+        part = min(max(now - began, 0.0) / segment.duration, 1.0)
+        weight = 1.0
         if segment.amplitude:
             weight = 2 * segment.duration / segment.period
         elif segment.holds:
             part = math.log1p(part / _FIRST_STEP) / math.log1p(1 / _FIRST_STEP)
-        done, total = done + part * weight, total + weight
+        done = done + part * weight
+        total = total + weight
     return max(done / total, 1e-6) if total else 1.0
 
 
@@ -376,10 +406,14 @@ def timed_convolution(rows: Rows, touching: float) -> float:
         Part of the cells in contact. [-]
     """
     if isinstance(rows, LoadingRows):
-        grid, gap, present = rows.scene.grid, rows.scene.gap, rows.scene.present
+        grid = rows.scene.grid
+        gap = rows.scene.gap
+        present = rows.scene.present
     else:
-        height, xp = rows.problem.height, arrays_of(rows.problem.settings.device)
-        gap, present = xp.asarray(float(height.max()) - height.values), None
+        height = rows.problem.height
+        xp = arrays_of(rows.problem.settings.device)
+        gap = xp.asarray(float(height.max()) - height.values)
+        present = None
         grid = Grid((gap.shape[0], gap.shape[1]), spacing(height), "periodic", xp=xp)
     gaps = to_host(gap)
     guess = np.maximum(np.quantile(gaps, min(max(touching, 0.01), 0.9)) - gaps, 0.0)
@@ -387,9 +421,12 @@ def timed_convolution(rows: Rows, touching: float) -> float:
         guess *= to_host(present)
     if not guess.any():
         guess = np.ones(gap.shape)
-    load, start, times = float(guess.sum()), grid.xp.asarray(guess), []
+    load = float(guess.sum())
+    start = grid.xp.asarray(guess)
+    times = []
     for _ in range(2):  # the first solve allocates memory
-        began, before = time.thread_time(), grid.convolutions
+        began = time.thread_time()
+        before = grid.convolutions
         with suppress(ConvergenceError):
             solve_contact(
                 grid, gap, load=load, start=start, tolerance=1e-11, present=present, max_iterations=_ITERATIONS
@@ -417,13 +454,25 @@ def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Availab
     there : Available
         Available memory.
     """
-    whole, height, settings = own.problem.height, solved(own), case.settings
-    part, force, rows = height.size / whole.size, run.force, run.steps
-    kind, model, area, note = "curve", "steady sliding", nominal_area(whole), ""
+    whole = own.problem.height
+    height = solved(own)
+    settings = case.settings
+    part = height.size / whole.size
+    force = run.force
+    rows = run.steps
+    kind = "curve"
+    model = "steady sliding"
+    area = nominal_area(whole)
+    note = ""
     arrays: Callable[[float], float] = partial(curve_bytes, settings)
     if isinstance(own, LoadingRows):
-        scene, program, model, area = own.scene, own.scene.program, own.scene.memory.note, own.area
-        kind, force, note = "slide" if program.slides else "load", max(force, program.largest_load), case.note
+        scene = own.scene
+        program = own.scene.program
+        model = own.scene.memory.note
+        area = own.area
+        kind = "slide" if program.slides else "load"
+        force = max(force, program.largest_load)
+        note = case.note
         rows = run.kept * run.steps if scene.kept is None else float(len(scene.kept))
         arrays = partial(march_bytes, settings, scene.memory, contact=float(run.contact[-1]), part=part)
 
@@ -436,7 +485,8 @@ def _costs(case: Case, own: Rows, run: CoarseRun, seconds: float, there: Availab
     seconds += run.seconds * height.size / run.cells
     if own.problem.settings.grid_error:
         seconds *= 1 + _GRID_ERROR
-    fraction, warning = float(run.contact[-1]) * part, ""
+    fraction = float(run.contact[-1]) * part
+    warning = ""
     if isinstance(own, LoadingRows) and own.reaches_border:
         warning = (
             "Contact is expected to reach the border of the free-space domain, which ends a run: use boundary = "
@@ -483,12 +533,14 @@ def disk(case: Case, cells: int, rows: float, steps: float, contact: float) -> f
 def totals(dataset: xr.Dataset, folder: Path, workers: int | None, there: Available) -> dict[str, Any]:
     """Return totals, free memory and disk, and the reason if the cases do not fit."""
     place = existing_part(folder.absolute())
-    free_disk, total = shutil.disk_usage(place).free, dataset.sizes["case"]
+    free_disk = shutil.disk_usage(place).free
+    total = dataset.sizes["case"]
     seconds = np.nan_to_num(dataset["wall_time"].values)
     largest = np.sort(np.nan_to_num(dataset["memory"].values))[::-1]
     processes = processes_that_fit(largest[0], threads_each(1), there.size) if workers is None else max(workers, 1)
     processes = min(processes, total)
-    together, size = float(np.sum(largest[:processes])), float(np.nansum(dataset["disk"].values))
+    together = float(np.sum(largest[:processes]))
+    size = float(np.nansum(dataset["disk"].values))
     refusals = [str(text) for text in dataset["refusal"].values if text]
     several = f"{len(refusals)} of {total} cases: " if total > 1 else ""
     reasons = [several + "; ".join([*dict.fromkeys(refusals)][:3])] if refusals else []

@@ -40,9 +40,11 @@ FOLDER = "trade"
 _USUAL = ("friction_coefficient", "contact_area", "pressure", "approach", "mean_gap")
 #: Default tolerances on the grid of the study; default ``(coarsening, tolerance)`` on coarser and finer grids.
 _TOLERANCES = (1e-1, 3e-2, 1e-2, 3e-3, 1e-3)
-_COARSER, _FINER = ((4.0, 1e-2), (2.0, 1e-2), (2.0, 1e-3)), ((0.5, 1e-3),)
+_COARSER = ((4.0, 1e-2), (2.0, 1e-2), (2.0, 1e-3))
+_FINER = ((0.5, 1e-3),)
 #: Fewest cells a side of a coarser grid, and most of a finer one.
-_FEWEST, _MOST = 12, 1024
+_FEWEST = 12
+_MOST = 1024
 #: Smallest tolerance of the settings over the tolerance of the reference.
 _SHARPER = 5.0
 #: Number of kept times if the study keeps all accepted steps, which differ between settings.
@@ -125,7 +127,8 @@ def trade(
     known = {"pressure", *quantities_of(case)}
     names = [name for name in dict.fromkeys([*requested, *_USUAL]) if name in known]
     height = case.height()
-    data, shape = is_data(case), (height.sizes["x"], height.sizes["y"])
+    data = is_data(case)
+    shape = (height.sizes["x"], height.sizes["y"])
     try:
         rungs = _ladder(data, shape) if settings is None else [(float(one), float(grid)) for one, grid in settings]
     except (TypeError, ValueError) as error:
@@ -138,8 +141,10 @@ def trade(
         if data and grid < 1:
             expected = "cells at least as long as those of the scan"
             raise InputError(key="settings", found=(tolerance, grid), expected=expected)
-    sharpest, finest = min(one for one, _ in rungs), 1.0 if data else min(grid for _, grid in rungs)
-    reference, looser = (sharpest / _SHARPER, finest), (sharpest, finest)
+    sharpest = min(one for one, _ in rungs)
+    finest = 1.0 if data else min(grid for _, grid in rungs)
+    reference = (sharpest / _SHARPER, finest)
+    looser = (sharpest, finest)
     second, third = ((reference[0], part * finest) for part in (2.0, 4.0))
     wanted = dict.fromkeys([*rungs, looser, third, second, reference])
     times: Any = case.settings.times or _FEW
@@ -202,7 +207,7 @@ def _ladder(data: bool, shape: tuple[int, int]) -> list[tuple[float, float]]:
     return rungs if data else rungs + [(one, grid) for grid, one in _FINER if max(shape) / grid <= _MOST]
 
 
-def _differences(found: xr.Dataset, wanted: xr.Dataset, names: Sequence[str]) -> NDArray[np.float64]:
+def _differences(result: xr.Dataset, wanted: xr.Dataset, names: Sequence[str]) -> NDArray[np.float64]:
     """Return the largest difference of each quantity over all rows, over the largest value of the second result.
 
     The difference of pressures is the integral of the absolute difference (L1), over the largest force. A quantity that
@@ -211,9 +216,11 @@ def _differences(found: xr.Dataset, wanted: xr.Dataset, names: Sequence[str]) ->
     errors = []
     for name in names:
         if name == "pressure":
-            error, largest = pressure_distance(found, wanted), float(wanted["force"].max())
+            error = pressure_distance(result, wanted)
+            largest = float(wanted["force"].max())
         else:
-            one, other = found[name].values, wanted[name].values
+            one = result[name].values
+            other = wanted[name].values
             error = np.abs(np.where(np.isnan(one) & np.isnan(other), 0.0, one - other))
             largest = float(np.fmax.reduce(np.abs(other), initial=0.0))
         errors.append(float(error.max()) / largest if largest else math.nan)
@@ -253,9 +260,11 @@ def pareto_front(dataset: xr.Dataset, quantity: str) -> NDArray[np.bool_]:
     quantity : str
         Quantity whose error counts.
     """
-    spent, wrong = dataset["run_time"].values, dataset["error"].sel(quantity=quantity).values
+    spent = dataset["run_time"].values
+    wrong = dataset["error"].sel(quantity=quantity).values
     wrong = np.array([float(f"{value:.1e}") for value in wrong])
-    order, best = np.lexsort((wrong, spent)), np.zeros(wrong.size, dtype=bool)
+    order = np.lexsort((wrong, spent))
+    best = np.zeros(wrong.size, dtype=bool)
     faster = np.fmin.accumulate(np.append(np.inf, wrong[order]))[:-1]
     best[order] = wrong[order] < faster
     return best
@@ -274,8 +283,10 @@ def cheapest(dataset: xr.Dataset, quantity: str, target: float) -> int | None:
     agreement does not count, plus the uncertainty of the reference. For a scan only settings on its own grid are
     chosen, because another grid means another surface.
     """
-    error, spent = dataset["error"].sel(quantity=quantity).values, dataset["run_time"].values
-    tolerance, coarsening = dataset["tolerance"].values, dataset["coarsening"].values
+    error = dataset["error"].sel(quantity=quantity).values
+    spent = dataset["run_time"].values
+    tolerance = dataset["tolerance"].values
+    coarsening = dataset["coarsening"].values
     sharper = [(coarsening == grid) & (tolerance <= one) for one, grid in zip(tolerance, coarsening, strict=True)]
     accurate = np.array([error[one].max() for one in sharper]) + uncertainty(dataset, quantity) <= target
     if dataset.attrs.get("grid_is_data"):

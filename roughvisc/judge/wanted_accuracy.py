@@ -32,9 +32,13 @@ from roughvisc.units import number
 
 log = logging.getLogger("roughvisc")
 #: First and smallest tolerance over the target; largest and smallest tolerance of all.
-_PART, _LEAST, _LARGEST, _SMALLEST = 0.2, 0.006, 1e-2, 1e-8
+_PART = 0.2
+_LEAST = 0.006
+_LARGEST = 1e-2
+_SMALLEST = 1e-8
 #: Level of the finest grid: its cells are ``2**-2`` times as long as in the study. Fewest cells a side of any grid.
-_FINEST, _FEWEST = -2, 12
+_FINEST = -2
+_FEWEST = 12
 #: Accepted ratio of an error to the target, since messages round both.
 _ROUNDING = 1.005
 #: Source -> what would reduce its error. The later ones depend neither on the grid nor on the tolerance.
@@ -123,7 +127,8 @@ def choose(
     targets = targets_of(want)
     wanted = {name: math.log1p(target) for name, target in targets.items()}
     observed = [quantity_of(case, name) for name in targets]
-    height, smallest = case.height(), min(targets.values())
+    height = case.height()
+    smallest = min(targets.values())
     base = neighbours.with_kept(case, [field for one in observed for field in one.fields])
     tolerance = min(max(_PART * smallest, _SMALLEST), _LARGEST)
     axis = case.experiment.axis
@@ -143,18 +148,20 @@ def choose(
         [own] = neighbours.solve([chosen], folder / neighbours.FOLDER, **computing).values()
         own = own if places is None else neighbours.at_rows(own, axis, places)
         own = own.isel({axis: np.flatnonzero(own["force"] > 0)})
-        found = neighbours.compared(chosen, sources, observed, folder / neighbours.FOLDER, own, **computing)
+        budgets = neighbours.compared(chosen, sources, observed, folder / neighbours.FOLDER, own, **computing)
         cells = "{} x {} cells".format(*neighbours.shape_on(case, height, 2.0**level))
-        reached = [f"{name} {_percent(error_of(one))}, wanted {_percent(wanted[name])}" for name, one in found.items()]
+        reached = [
+            f"{name} {_percent(error_of(one))}, wanted {_percent(wanted[name])}" for name, one in budgets.items()
+        ]
         tell(f"{cells}: {'; '.join(reached)}")
-        steps = max(error_of(one, [neighbours.STEPS]) / wanted[name] for name, one in found.items())
+        steps = max(error_of(one, [neighbours.STEPS]) / wanted[name] for name, one in budgets.items())
         if level == coarsest and 0.5 < steps < math.inf and tolerance > _LEAST * smallest:
             tolerance = max(tolerance * _PART / steps, _LEAST * smallest)
             continue  # steps and solver would use more than half of the target
-        if all(error_of(one) <= _ROUNDING * wanted[name] for name, one in found.items()):
+        if all(error_of(one) <= _ROUNDING * wanted[name] for name, one in budgets.items()):
             break
         # neither a finer grid nor a smaller tolerance reduces the errors of other sources
-        _refuse_missed(case, targets, found, list(_REMEDIES)[0 if level == _FINEST else 2 :], cells)
+        _refuse_missed(case, targets, budgets, list(_REMEDIES)[0 if level == _FINEST else 2 :], cells)
         level -= 1
 
     path = case_path(folder, chosen.key, "result")
@@ -162,9 +169,9 @@ def choose(
         with atomic_write(path) as temporary:
             shutil.copyfile(case_path(folder / neighbours.FOLDER, chosen.key, "result"), temporary)
     reasons = [f"grid: {cells}", *reached, f"tolerance: {chosen.settings.tolerance:.2g}"]
-    if unknown := found[observed[0].name].attrs["open"]:
+    if unknown := budgets[observed[0].name].attrs["open"]:
         reasons.append(f"open, and not counted: {unknown}")
-    return chosen, reasons, found
+    return chosen, reasons, budgets
 
 
 def error_of(budget: xr.Dataset, sources: Sequence[str] | None = None) -> float:
@@ -182,7 +189,8 @@ def _refuse_missed(
 ) -> None:
     """Refuse the first target below the error by some sources; name the largest one, and what would reduce it."""
     for name, budget in budgets.items():
-        wanted, error = math.log1p(targets[name]), error_of(budget, sources)
+        wanted = math.log1p(targets[name])
+        error = error_of(budget, sources)
         if error <= _ROUNDING * wanted:
             continue
         if math.isinf(error):

@@ -83,7 +83,8 @@ def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, 
     kept = dataset.sortby(axis)
     steps = steps_of(kept) if axis == "time" else kept
     # an odd number of panels in two columns would leave a hole
-    columns, height = 2 if len(names) > 3 and len(names) % 2 == 0 else 1, 0.9 if len(names) > 2 else 1.7
+    columns = 2 if len(names) > 3 and len(names) % 2 == 0 else 1
+    height = 0.9 if len(names) > 2 else 1.7
     figure, axes = style.new_panels(len(names), columns, (4.1 - 0.6 * columns, height), shared="x", left=0.85)
     across = style.row_axis(axes, (kept if steps is None or over not in steps else steps)[over])
     for ax, name in zip(axes, names, strict=True):
@@ -111,10 +112,13 @@ def _draw_history(ax: Axes, name: str, steps: xr.Dataset | None, kept: xr.Datase
     across : Unit
         Unit of the horizontal axis.
     """
-    values, at = kept[name], across(kept[over])
-    (label, si), colour = style.described(kept[name]), style.CONTACT if "contact" in name else style.BLUE
+    values = kept[name]
+    at = across(kept[over])
+    label, si = style.described(kept[name])
+    colour = style.CONTACT if "contact" in name else style.BLUE
     line = values if steps is None else steps[name]
-    unit, is_finer = unit_for(line, si), line.size > values.size
+    unit = unit_for(line, si)
+    is_finer = line.size > values.size
     if steps is not None:
         ax.plot(across(steps[over]), unit(line), color=colour, label="time steps" if is_finer else None)
     if values.size <= _DOTS or steps is None:
@@ -190,7 +194,8 @@ def area_against_load(results: xr.Dataset | Mapping[str, xr.Dataset], *, contact
     steps = {label: steps_of(case) for label, case in cases.items()}
     lines = {label: case if steps[label] is None else steps[label] for label, case in cases.items()}
     loads, areas = (np.concatenate([one[name] for one in lines.values()]) for name in ("force", "contact_area"))
-    across, up = unit_for(loads, "N"), unit_for(areas, "m^2")
+    across = unit_for(loads, "N")
+    up = unit_for(areas, "m^2")
     figure, (ax,) = style.new_panels(1, 1, (3.4, 2.6), lines=0)
     for (label, one), look in zip(lines.items(), style.distinct(len(lines)), strict=True):
         if steps[label] is not None and one["force"].size > _DOTS:
@@ -203,7 +208,8 @@ def area_against_load(results: xr.Dataset | Mapping[str, xr.Dataset], *, contact
         first = next(iter(cases.values()))
         expect_result(first, "height")
         slope = rms_slope(first["height"], periodic=first.attrs.get("boundary") == "periodic")
-        nominal, forces = nominal_area(first), np.geomspace(1e-3 * loads.max(), loads.max(), 50)
+        nominal = nominal_area(first)
+        forces = np.geomspace(1e-3 * loads.max(), loads.max(), 50)
         for (name, modulus), dash in zip(named.items(), ("--", ":", "-.") * len(named), strict=False):
             for label, theory, shade in (("low loads", asperity_fraction, "k"), ("Persson", persson_fraction, "0.55")):
                 area = nominal * theory(forces / (nominal * modulus * slope))
@@ -358,11 +364,14 @@ def budget(dataset: xr.Dataset, row: int = -1) -> Figure:
         raise InputError("expected the Dataset of rv.budget")
     if "quantity" in dataset.dims:
         raise InputError("found several quantities: expected one, such as dataset.sel(quantity='contact_area')")
-    axis, unknown = AXES[axis_of(dataset.variables)], dataset.attrs["open"].split("; ")
+    axis = AXES[axis_of(dataset.variables)]
+    unknown = dataset.attrs["open"].split("; ")
     names = [f"{name} (open)" if name in unknown else str(name) for name in dataset["source"].values]
     at = dataset.isel({axis.name: row})
-    half, towards = at["half_width"].values, at["direction"].values
-    low, high = np.where(towards <= 0, -half, 0.0), np.where(towards >= 0, half, 0.0)
+    half = at["half_width"].values
+    towards = at["direction"].values
+    low = np.where(towards <= 0, -half, 0.0)
+    high = np.where(towards >= 0, half, 0.0)
     whole = [float(at[end] / at["value"].where(at["value"] != 0)) for end in ("lower", "upper")]
     ends = 100 * (np.nan_to_num([*np.exp(np.c_[low, high]), whole], nan=1.0) - 1)
     figure, (ax,) = style.new_panels(1, 1, (2.6, 2.1), lines=0, left=0.2 + style.LETTER * max(map(len, names)))

@@ -12,6 +12,7 @@ import xarray as xr
 from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize, TwoSlopeNorm
+from matplotlib.contour import ContourSet
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.patches import Patch
@@ -24,6 +25,7 @@ from roughvisc.observables import contact, leakage
 from roughvisc.observables.history import expect_result, need
 from roughvisc.paths import path_of
 from roughvisc.plot import style
+from roughvisc.progress import reporting
 from roughvisc.runs.folder import atomic_write
 from roughvisc.topography.filters import fill, off_plane
 from roughvisc.topography.grid import cell_edges, checked, require_heights, spacing
@@ -44,11 +46,13 @@ LOOK = {
 #: Colour map of a pressure that is negative in some cells: tension blue, pressure red.
 SIGNED = "RdBu_r"
 #: Largest number of drawn cells along the longer side, and of times or speeds in one figure.
-MOST_CELLS, _MOST_FRAMES = 1024, 8
+MOST_CELLS = 1024
+_MOST_FRAMES = 8
 #: Flux that stands for zero. [m^2/s]
 _NO_FLOW = 1e-300
 #: Part of the positive values within a colour scale [%], unless the largest value is less than this times larger.
-_SHOWN, _SPIKE = 99.8, 1.2
+_SHOWN = 99.8
+_SPIKE = 1.2
 
 
 def rows_at(places: Any, axis: str, key: str, count: int, most: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
@@ -102,12 +106,14 @@ def representative_frames(dataset: xr.Dataset) -> list[int]:
     order = dataset[axis].values.argsort()
     if "flux" in dataset and "leak_rate" in dataset:
         leaks = dataset["leak_rate"].values[order] > 0
-        leaking, closed = order[leaks], order[~leaks]
+        leaking = order[leaks]
+        closed = order[~leaks]
         spread = np.unique(np.linspace(0, leaking.size - 1, 3).round().astype(int)) if leaking.size else []
         return [*leaking[spread].tolist(), *closed[:1].tolist()]
     area = np.nan_to_num(dataset["contact_area"].values[order]) if "contact_area" in dataset else np.zeros(order.size)
     if (area > 0).any():
-        order, area = order[area > 0], area[area > 0]
+        order = order[area > 0]
+        area = area[area > 0]
     change = np.append(0.0, np.abs(np.diff(area)).cumsum())
     if axis == "speed" or not change[-1] > 0:
         change = np.arange(order.size)
@@ -175,7 +181,8 @@ def scale_ends(name: str, frames: Iterable[xr.DataArray]) -> Ends:
     Few values far beyond all others are outside the scale. Fields that begin at zero count where they are positive.
     """
     begins_at_zero = LOOK.get(name, LOOK["displacement"])[2] is not None
-    ends, signed = list[Any](), list[Any]()
+    ends = list[Any]()
+    signed = list[Any]()
     for frame in frames:
         if name == "pressure" and (frame.values < 0).any():
             signed.append(np.nanpercentile(frame.values, (0, 100 - _SHOWN, _SHOWN, 100)))
@@ -183,7 +190,8 @@ def scale_ends(name: str, frames: Iterable[xr.DataArray]) -> Ends:
         if known.size:
             ends.append(np.percentile(known, (0, _SHOWN, 100)))
     if signed:
-        (lowest, low), (_, most) = np.min(signed, axis=0)[:2], np.max(signed, axis=0)[2:]
+        lowest, low = np.min(signed, axis=0)[:2]
+        _, most = np.max(signed, axis=0)[2:]
         high = max([np.max(signed, axis=0)[2], *(end[1] for end in ends), -1e-3 * low])
         most = max([most, *(end[2] for end in ends)])
         return Ends(float(lowest), float(low), float(high), float(most), is_signed=True)
@@ -200,7 +208,8 @@ def colour_scale(name: str, frames: Iterable[xr.DataArray]) -> tuple[Unit, Norma
     begins_at_zero = LOOK[name][2] is not None
     ends = scale_ends(name, frames)
     unit = unit_for([ends.low, ends.high], VARIABLES[name].units)
-    low, high = float(unit(ends.low)), float(unit(ends.high))
+    low = float(unit(ends.low))
+    high = float(unit(ends.high))
     if ends.is_signed:
         return unit, TwoSlopeNorm(0.0, low, high)
     if name == "flux":
@@ -222,14 +231,19 @@ def contact_of(dataset: xr.Dataset, frame: int) -> xr.DataArray | None:
     return None
 
 
-def draw_outline(ax: Axes, contact: xr.DataArray | None) -> None:
-    """Draw a thin dark line around the contact, in proportion to the cells, so that small spots keep their colour."""
+def draw_outline(ax: Axes, contact: xr.DataArray | None) -> ContourSet | None:
+    """Draw a thin dark line around the contact, in proportion to the cells, so that small spots keep their colour.
+
+    Return the line; None if no cell or every cell touches.
+    """
     if contact is None or not 0 < contact.mean() < 1:
-        return
+        return None
     plane = plane_unit(contact)
     width = ax.get_position().width * ax.figure.get_figwidth() * 72 / contact.sizes["x"]  # of a cell [pt]
-    x, y = plane(contact["x"]), plane(contact["y"])
-    ax.contour(x, y, contact, [0.5], colors=style.OUTLINE, linewidths=float(np.clip(0.4 * width, 0.04, 0.5)))
+    x = plane(contact["x"])
+    y = plane(contact["y"])
+    thin = float(np.clip(0.4 * width, 0.04, 0.5))
+    return ax.contour(x, y, contact, [0.5], colors=style.OUTLINE, linewidths=thin)
 
 
 def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, norm: Normalize) -> AxesImage:
@@ -246,12 +260,15 @@ def draw_map(ax: Axes, field: xr.DataArray, unit: Unit, norm: Normalize) -> Axes
     norm : matplotlib.colors.Normalize
         Colour scale, in this unit.
     """
-    plane, (colours, _, below, _) = plane_unit(field), LOOK[str(field.name)]
+    plane = plane_unit(field)
+    colours, _, below, _ = LOOK[str(field.name)]
     if isinstance(norm, TwoSlopeNorm):
-        colours, below = SIGNED, None
+        colours = SIGNED
+        below = None
     x, y = map(plane, cell_edges(field))
     bad = style.CONTACT if field.name == "flux" else style.MISSING
-    values, extent = np.ma.masked_invalid(unit(field.transpose("y", "x"))), (x[0], x[-1], y[0], y[-1])
+    values = np.ma.masked_invalid(unit(field.transpose("y", "x")))
+    extent = (x[0], x[-1], y[0], y[-1])
     cmap = matplotlib.colormaps[colours].with_extremes(bad=bad, under=below)
     image = ax.imshow(values, cmap=cmap, norm=norm, aspect="auto", origin="lower", extent=extent)
     ax.grid(visible=False)
@@ -264,7 +281,8 @@ def _draw_field(
 ) -> dict[str, Patch]:
     """Draw one field at some rows on one colour scale, or on one each; return the entries of its legend."""
     shown = [frame_of(dataset, name, frame) for frame in frames]
-    named, (_, _, below, word) = {}, LOOK[name]
+    named = {}
+    _, _, below, word = LOOK[name]
     for group in [[i] for i in range(len(shown))] if each else [range(len(shown))]:
         fields = [shown[i] for i in group]
         unit, norm = colour_scale(name, fields)
@@ -359,11 +377,13 @@ def maps(dataset: xr.Dataset, times: Any = None, fields: Sequence[str] | str = (
     has_own_scales = axis_of(dataset.variables) == "speed" or "flux" in stored  # over decades of pressure or flux
     columns = min(count, 2) if has_own_scales else count
     size = map_size(dataset, 2.0 if has_own_scales else max(1.3, 2.9 - 0.45 * count), 3.25)
-    room, named = {"between": max(0.3, 1.5 - size[0]), "right": style.BAR}, {}
+    room = {"between": max(0.3, 1.5 - size[0]), "right": style.BAR}
+    named = {}
     if has_own_scales:
         room["between"] = style.BAR + 0.15
     if size[0] > 3 * size[1]:  # strips are stacked
-        columns, size = 1, map_size(dataset, 4.5, 4.0)
+        columns = 1
+        size = map_size(dataset, 4.5, 4.0)
     rows = -(-count // columns)
     figure, panels = style.new_panels(rows * columns * len(stored), columns, size, shared="xy", **room)
     used = [panels[number * rows * columns :][:count] for number in range(len(stored))]
@@ -388,8 +408,8 @@ def flux_of(dataset: xr.Dataset) -> xr.DataArray:
     stated = dataset["leak_rate"].attrs if "leak_rate" in dataset else {}
     options = {name: value for name, value in stated.items() if name in ("along", "viscosity", "pressure_drop")}
     gap = dataset[["gap"]].chunk({axis_of(dataset.variables): 1, "x": -1, "y": -1}).assign_attrs(dataset.attrs)
-    found = leakage(gap, flow=True, **options)
-    size = np.hypot(found["flux_x"], found["flux_y"]).clip(_NO_FLOW)  # zero has no logarithm
+    flow = leakage(gap, flow=True, **options)
+    size = np.hypot(flow["flux_x"], flow["flux_y"]).clip(_NO_FLOW)  # zero has no logarithm
     return size.where(gap["gap"] > 0)
 
 
@@ -434,15 +454,21 @@ def section(dataset: xr.Dataset, time: Any = None, axis: str = "x", at: Quantity
     """
     dataset = expect_result(dataset, "x", "y", "height", "pressure", "gap")
     one_of("axis", axis, ("x", "y"))
-    rows, across = axis_of(dataset.variables), "y" if axis == "x" else "x"
+    rows = axis_of(dataset.variables)
+    across = "y" if axis == "x" else "x"
     frame = largest_row(dataset) if time is None else frames_at(dataset, time, "time")[0]
     whole = dataset.isel({rows: frame})
-    load, places = whole["pressure"].sum(axis).values, dataset[across].values
+    load = whole["pressure"].sum(axis).values
+    places = dataset[across].values
     index = int(load.argmax() if at is None else np.abs(places - at).argmin())
     cut = whole.isel({across: index}).load()
-    height, surface = cut["height"], cut["height"] + cut["gap"]
-    plane, pressure, unit = plane_unit(dataset), unit_for(cut["pressure"], "Pa"), unit_for(surface - height.min(), "m")
-    edges, x = plane(cell_edges(dataset)["xy".index(axis)]), plane(dataset[axis])
+    height = cut["height"]
+    surface = cut["height"] + cut["gap"]
+    plane = plane_unit(dataset)
+    pressure = unit_for(cut["pressure"], "Pa")
+    unit = unit_for(surface - height.min(), "m")
+    edges = plane(cell_edges(dataset)["xy".index(axis)])
+    x = plane(dataset[axis])
     figure, (top, bottom) = style.new_panels(2, 1, (4.1, 1.4), shared="x")
     style.letter([top, bottom])
     top.stairs(pressure(cut["pressure"]), edges, fill=True, fc=(0, 0.62, 0.45, 0.3), ec=style.GREEN, lw=1)
@@ -457,7 +483,8 @@ def section(dataset: xr.Dataset, time: Any = None, axis: str = "x", at: Quantity
     bottom.set(xlim=(edges[0], edges[-1]), ylim=(low, high), xlabel=plane.label(axis), ylabel=unit.label("Height"))
     place = f"{across} = {plane.text(float(dataset[across][index]))}"
     top.set_title(f"{AXES[rows].place(float(whole[rows]), 3)},  {place}")
-    box, inches = bottom.get_position(), figure.get_size_inches()
+    box = bottom.get_position()
+    inches = figure.get_size_inches()
     up = box.height * inches[1] / (unit.factor * (high - low))
     along = box.width * inches[0] / (plane.factor * (edges[-1] - edges[0]))
     bottom.set_title(f"heights enlarged {up / along:.3g} times", fontsize=8)
@@ -469,7 +496,9 @@ def section(dataset: xr.Dataset, time: Any = None, axis: str = "x", at: Quantity
 @style.apply
 @quantities(rate="1/s > 0")
 def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, rate: Quantity = 12.0) -> Path:
-    """Write an animation of a map, whose title states the time or speed.
+    """Write an animation of a map with the outline of the contact; its title states the time or speed.
+
+    A progress bar counts the frames.
 
     Parameters
     ----------
@@ -521,13 +550,22 @@ def animate(dataset: xr.Dataset, path: Any, *, field: str | None = None, rate: Q
     figure, (ax,) = style.new_panels(1, 1, map_size(dataset, 3.2, 4.2), right=style.BAR)
     image = draw_map(ax, frame_of(dataset, name, 0), unit, norm)
     style.colour_bar(image, [ax], unit.label(VARIABLES[name].label))
+    outline: ContourSet | None = None
 
     def draw(frame: int) -> None:
+        nonlocal outline
         ax.set_title(frame_title(dataset, frame))
         image.set_data(np.ma.masked_invalid(unit(frame_of(dataset, name, frame).transpose("y", "x"))))
+        if outline is not None:
+            outline.remove()
+        outline = draw_outline(ax, contact_of(dataset, frame))
 
-    with atomic_write(path) as temporary:
-        FuncAnimation(figure, draw, count, cache_frame_data=False).save(temporary, writer(fps=rate), dpi=100)
+    with (
+        atomic_write(path) as temporary,
+        reporting("animation", lambda done, count: f"{done:.0f} of {count:.0f} frames") as report,
+    ):
+        animation = FuncAnimation(figure, draw, count, cache_frame_data=False)
+        animation.save(temporary, writer(fps=rate), dpi=100, progress_callback=lambda frame, _: report(frame, count))
     return path
 
 
@@ -575,7 +613,8 @@ def surface(height: xr.DataArray | xr.Dataset, cutoff: Quantity | None = None) -
     height = checked(height, "surface", least=1).rename("height")
     require_heights(height, "surface")
     low, high = np.nanpercentile(height, (1, 99))
-    unit, plane = unit_for([low, high], "m"), plane_unit(height)
+    unit = unit_for([low, high], "m")
+    plane = plane_unit(height)
     along_x, along_y = map(np.ptp, cell_edges(height))
     size = 2.6, 2.6 * float(np.clip(along_y / along_x, 0.6, 1.6))
     figure, axes = style.new_panels(4, 2, size, between=1.75)
@@ -596,7 +635,8 @@ def surface(height: xr.DataArray | xr.Dataset, cutoff: Quantity | None = None) -
     levelled = off_plane(height)
     known = levelled.values[np.isfinite(levelled.values)]
     low, high = np.percentile(known, (1, 99))
-    unit, ends = unit_for([low, high], "m"), np.array([1.5 * low - 0.5 * high, 1.5 * high - 0.5 * low])
+    unit = unit_for([low, high], "m")
+    ends = np.array([1.5 * low - 0.5 * high, 1.5 * high - 0.5 * low])
     heights.hist(unit(known), int(np.clip(known.size**0.5 / 2, 8, 100)), range=unit(ends), density=True, alpha=0.5)
     outside = np.mean((known < ends[0]) | (known > ends[1])) if high > low else 0.0
     heights.set_title(f"Sq = {unit.text(known.std())}{f', {100 * outside:.2g} % beyond' if outside else ''}")
@@ -611,10 +651,13 @@ def _draw_spectrum(ax: Axes, levelled: xr.DataArray, cutoff: float | None) -> No
     """Draw the radial power spectral density of the levelled heights, up to the lower limit of both axes."""
     if min(levelled.shape) >= 8 and float(levelled.std()) > 0:
         gaps = bool(levelled.isnull().any())
-        found = psd(fill(levelled.drop_attrs()) if gaps else levelled, window="hann")
-        found = found.sel(wavevector=slice(np.pi / max(spacing(levelled))))  # rings inside the square of wavevectors
-        found = found.where(found["psd"] > 1e-14 * found["psd"].max(), drop=True)  # the rest is rounding
-        q, density = 1e-6 * found["wavevector"], 1e24 * found["psd"]
+        spectrum = psd(fill(levelled.drop_attrs()) if gaps else levelled, window="hann")
+        spectrum = spectrum.sel(
+            wavevector=slice(np.pi / max(spacing(levelled)))
+        )  # rings inside the square of wavevectors
+        spectrum = spectrum.where(spectrum["psd"] > 1e-14 * spectrum["psd"].max(), drop=True)  # the rest is rounding
+        q = 1e-6 * spectrum["wavevector"]
+        density = 1e24 * spectrum["psd"]
         ax.plot(q, density, lw=1)
         style.log_axis(ax.xaxis, q)
         style.log_axis(ax.yaxis, density)

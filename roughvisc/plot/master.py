@@ -19,7 +19,8 @@ _QUANTITIES = {
     "creep": ("Creep compliance", "o"),
 }
 #: Number of points of the line of the material, and colours of the temperatures, cold to warm.
-_POINTS, _COLOURS = 200, "plasma"
+_POINTS = 200
+_COLOURS = "plasma"
 
 
 @style.apply

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import base64
+import gc
 import io
 import json
-from collections.abc import Sequence
-from contextlib import nullcontext, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext, suppress
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -39,13 +40,29 @@ from roughvisc.units import unit_for
 from roughvisc.variables import AXES, VARIABLES, axis_of, in_table
 
 #: Largest numbers of cases with audit and study, and with figures; both are evenly spread.
-_SHOWN, _DRAWN = 6, 2
+_SHOWN = 6
+_DRAWN = 2
 #: Resolution of pictures, and the width from which a narrow screen scrolls them. [1/inch], [inch]
-_DPI, _WIDE = 110, 5.5
+_DPI = 110
+_WIDE = 5.5
+#: Size of a result below which it is read as a whole. [byte]
+_LOADED = 64 << 20
 #: Surface parameters shown.
 _PARAMETERS = ("Sa", "Sq", "Ssk", "Sku", "Sz", "Sdq", "Sdr", "missing_fraction")
 
 
+@contextmanager
+def _rare_garbage_collection() -> Iterator[None]:
+    """Collect garbage rarely within the block: figures consist of many small objects, and few become garbage."""
+    usual = gc.get_threshold()
+    gc.set_threshold(100_000, *usual[1:])
+    try:
+        yield
+    finally:
+        gc.set_threshold(*usual)
+
+
+@_rare_garbage_collection()
 def report(results: str | Path | xr.Dataset, path: str | Path | None = None, *, workers: int | None = 0) -> Path:
     """Write a page that shows results: cases, accuracy, figures, surface, assumptions, and how to repeat them.
 
@@ -95,13 +112,16 @@ def report(results: str | Path | xr.Dataset, path: str | Path | None = None, *, 
     }
     out = None if path is None else path_of(path, "path")
     count("workers", workers, 0)
-    sources, numbers, histories = [results], {}, {}
+    sources = [results]
+    numbers = {}
+    histories = {}
     if isinstance(results, xr.Dataset):
         if out is None:
             raise InputError(key="path", found=None, expected="the name of the page, if a Dataset is given")
     elif (folder := path_of(results, "results")).is_dir():
         out = out or folder / "report.html"
-        sources, failed = result_files(folder), (path.name.partition(".")[0] for path in folder.glob("*.failed.json"))
+        sources = result_files(folder)
+        failed = (path.name.partition(".")[0] for path in folder.glob("*.failed.json"))
         page["failures"] = {key: recorded_failure(folder, key) for key in sorted(failed)}
         if not sources and not page["failures"]:
             raise no_results(folder)
@@ -111,7 +131,8 @@ def report(results: str | Path | xr.Dataset, path: str | Path | None = None, *, 
             page["figures"] = [_picture(caption, figure) for _, caption, figure in sweep_figures(swept)]
             histories = _histories(swept)
     else:
-        out, sources = out or folder.with_name(f"{folder.stem}-report.html"), [folder]
+        out = out or folder.with_name(f"{folder.stem}-report.html")
+        sources = [folder]
     shown = _spread(range(len(sources)), _SHOWN)
     drawn_cases = _spread(shown, _DRAWN)
     jobs = [
@@ -171,6 +192,8 @@ def _audits(cases: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def _picture(caption: str, figure: Figure) -> dict[str, Any]:
     """Return a figure as a PNG in a data URL, with its caption."""
     stream = io.BytesIO()
+    for axis in (axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis) if not axis.label.get_text()):
+        axis.set_label_coords(0, 0)  # matplotlib need not measure the numbers to place an empty label
     figure.savefig(stream, format="png", dpi=_DPI)
     src = f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"
     width = figure.get_figwidth()
@@ -182,27 +205,32 @@ def _case(job: tuple[Path | xr.Dataset, int, bool, bool]) -> dict[str, Any]:
     source, number, is_shown, is_drawn = job
     with open_result(source) if isinstance(source, Path) else nullcontext(source) as dataset:
         dataset = expect_result(dataset, "x", "y")
+        if is_shown and dataset.nbytes < _LOADED:
+            dataset = dataset.load()  # otherwise each frame opens the file
         case = json.loads(dataset.attrs.get("case", "{}"))
         title = str(case.get("title") or dataset.attrs.get("title") or f"case {number}")
-        found = {"title": title, "name": case_words(case) or title, "key": str(dataset.attrs.get("case_key", ""))}
-        found["cells"] = _cells(dataset)
-        return found | (_details(dataset, case, number, is_drawn) if is_shown else {})
+        facts = {"title": title, "name": case_words(case) or title, "key": str(dataset.attrs.get("case_key", ""))}
+        facts["cells"] = _cells(dataset)
+        return facts | (_details(dataset, case, number, is_drawn) if is_shown else {})
 
 
 def _details(dataset: xr.Dataset, case: dict[str, Any], number: int, is_drawn: bool) -> dict[str, Any]:
     """Return figures, assumptions and study of one case, and its surface if it is the first case or differs."""
     height = dataset.get("height", xr.DataArray())
-    found: dict[str, Any] = {"attributes": {**height.attrs, **dataset.attrs}, "text": study_text(case) if case else ""}
-    found["warnings"] = warnings_of(dataset.attrs)
-    found["figures"] = [
+    details: dict[str, Any] = {
+        "attributes": {**height.attrs, **dataset.attrs},
+        "text": study_text(case) if case else "",
+    }
+    details["warnings"] = warnings_of(dataset.attrs)
+    details["figures"] = [
         _picture(caption, figure) for _, caption, figure in figures_of(dataset, DEFAULT if is_drawn else ())
     ]
     if height.ndim and (number == 0 or varies_surface(case)):
         picture = _picture(FIGURES["surface"][2], surface(height))
-        found["surface"] = {"picture": picture, "parameters": parameters(off_plane(height.load()))[[*_PARAMETERS]]}
+        details["surface"] = {"picture": picture, "parameters": parameters(off_plane(height.load()))[[*_PARAMETERS]]}
     with suppress(InputError):  # a Dataset that lacks the variables of an audit
-        found["audit"] = list(audit_of(dataset))
-    return found
+        details["audit"] = list(audit_of(dataset))
+    return details
 
 
 def _text(value: xr.DataArray) -> str:
@@ -217,7 +245,8 @@ def _cells(dataset: xr.Dataset) -> dict[str, str]:
     cells = {"Grid": f"{dataset.sizes['x']} × {dataset.sizes['y']}"}
     cells |= {variable.label: _text(telling[name]) for name, variable in in_table("value").items() if name in telling}
     if "stated_error" in dataset and dataset["stated_error"].notnull().any():
-        worst, tolerance = float(dataset["stated_error"].max()), dataset.attrs.get("tolerance", np.inf)
+        worst = float(dataset["stated_error"].max())
+        tolerance = dataset.attrs.get("tolerance", np.inf)
         above = f", above the tolerance of {tolerance:g}" if worst > tolerance else ""
         cells[VARIABLES["stated_error"].label] = f"{worst:.2g}{above}"
     cells[VARIABLES["grid_error"].label] = grid_error_of([dataset])

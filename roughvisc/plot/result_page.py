@@ -47,7 +47,8 @@ LEVELS = 4095
 #: Largest size of the compressed fields. [byte]
 LARGEST = 60_000_000
 #: Numbers of rows and of cells a side from which a large page drops rows or cells first, whichever is exceeded more.
-_FEW_ROWS, _FEW_CELLS = 25, 256
+_FEW_ROWS = 25
+_FEW_CELLS = 256
 #: Size up to which a result is read once; a larger one is read frame by frame, some times. [byte]
 _IN_MEMORY = 256 << 20
 #: Decades of a logarithmic field.
@@ -69,12 +70,15 @@ class _Thinning:
 
     def coarser(self, factor: float) -> _Thinning:
         """Return a thinning with at least this factor less to keep."""
-        rows, cells = self.rows, self.cells
+        rows = self.rows
+        cells = self.cells
         while factor > 1:
             if rows / _FEW_ROWS >= cells / _FEW_CELLS:
-                rows, factor = rows // 2, factor / 2
+                rows = rows // 2
+                factor = factor / 2
             else:
-                cells, factor = cells // 2, factor / 4
+                cells = cells // 2
+                factor = factor / 4
         return _Thinning(max(rows, 1), max(cells, 8))
 
 
@@ -107,7 +111,7 @@ def page(results: str | Path | xr.Dataset, path: str | Path | None = None) -> Pa
     Notes
     -----
     The page shows every field over (time, x, y) or (speed, x, y) in the results. For the flow of a fluid, merge it:
-    ``rv.plot.page(ds.merge(rv.observables.leakage(ds, flow=True)))``.
+    ``rv.plot.page(ds.merge(rv.observables.leakage(ds, flow=True), compat="equals", join="exact"))``.
 
     Examples
     --------
@@ -216,7 +220,8 @@ def _sources(results: Any) -> tuple[list[_Source], Path]:
 
 def _note(sources: Sequence[_Source], thinning: _Thinning) -> str:
     """Return what the page leaves out, as a sentence; empty if it has everything."""
-    parts, most = [], max(source.rows for source in sources)
+    parts = []
+    most = max(source.rows for source in sources)
     if thinning.rows < most:
         parts.append(f"{thinning.rows} of {most} {AXES[sources[0].axis].rows}")
     if thinning.cells < MOST_CELLS:
@@ -355,11 +360,15 @@ def _packed(dataset: xr.Dataset, name: str, rows: Sequence[int], cells: int) -> 
     lowest, low, high, most, is_signed = scale_ends(name, _frames(dataset, name, rows, cells))
     unit = unit_for([low, high], si)
     if is_signed:
-        palette, below, most = SIGNED, None, max(most, 0.0)
+        palette = SIGNED
+        below = None
+        most = max(most, 0.0)
     decades = _DECADES if name == "flux" else 0
     least = 0.0 if below else lowest
     spread = most - least or 1.0
-    compressor, data, size = zlib.compressobj(6, wbits=31), b"", 0
+    compressor = zlib.compressobj(6, wbits=31)
+    data = b""
+    size = 0
     before: Any = np.uint16(0)
     for frame in _frames(dataset, name, rows, cells):
         values = frame.values

@@ -152,7 +152,8 @@ def save_figures_of_files(
     stems = file_stems(named)
     jobs: list[Any] = []
     for path in paths:
-        known, with_surface = FIGURES if every else DEFAULT, not jobs or varies_surface(cases[path.stem])
+        known = FIGURES if every else DEFAULT
+        with_surface = not jobs or varies_surface(cases[path.stem])
         names = [name for name in known if name != "surface" or with_surface]
         jobs.append((path, folder or path.parent, stems.get(path.stem, path.stem), names, kind))
     return [one for written in in_parallel(_save_file, jobs, processes, "drawing") for one in written]
@@ -176,8 +177,8 @@ def in_parallel(work: Callable[[Any], Any], jobs: Sequence[Any], processes: int,
     with pool, reporting(label, lambda done, count: f"{done:.0f} of {count:.0f} cases") as report:
         results = []
         try:
-            for found in pool.map(work, jobs) if min(processes, len(jobs)) > 1 else map(work, jobs):
-                results.append(found)
+            for result in pool.map(work, jobs) if min(processes, len(jobs)) > 1 else map(work, jobs):
+                results.append(result)
                 report(len(results), len(jobs))
         except BrokenProcessPool as error:
             lost = f"{label}: a process was killed, perhaps because the memory was full: expected more free memory"

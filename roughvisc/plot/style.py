@@ -23,15 +23,21 @@ from roughvisc.variables import VARIABLES
 #: Style sheet of all figures.
 STYLE = matplotlib.rc_params_from_file(Path(__file__).with_name("roughvisc.mplstyle"), use_default_template=False)
 #: Main colours of its cycle: distinguishable with all common kinds of colour vision.
-BLUE, VERMILION, GREEN = "#0072b2", "#d55e00", "#009e73"
+BLUE = "#0072b2"
+VERMILION = "#d55e00"
+GREEN = "#009e73"
 #: Contact in all figures; cells without contact on a map of the pressure; missing cells.
-CONTACT, NO_CONTACT, MISSING = VERMILION, "#dceaf5", "0.72"
+CONTACT = VERMILION
+NO_CONTACT = "#dceaf5"
+MISSING = "0.72"
 #: Line around the contact on maps.
 OUTLINE = "#1d2328"
 #: Mean width of a letter of 8 points, and height of a line of text. [inch]
-LETTER, _LINE = 0.066, 0.16
+LETTER = 0.066
+_LINE = 0.16
 #: Markers and dashes of lines that are told apart without colours.
-_MARKERS, _DASHES = "os^DvPX*", ("-", (0, (5, 1.5)), (0, (6, 1.5, 1, 1.5)), (0, (1.5, 1.2)))
+_MARKERS = "os^DvPX*"
+_DASHES = ("-", (0, (5, 1.5)), (0, (6, 1.5, 1, 1.5)), (0, (1.5, 1.2)))
 #: Width of a colour bar with its labels. [inch]
 BAR = 1.0
 #: Ratio of the largest to the smallest value from which an axis is logarithmic.
@@ -71,9 +77,14 @@ def new_panels(
     **room : float
         Margins ``left``, ``right`` and ``bottom`` of the panels, and ``between`` two columns. [inch]
     """
-    (width, height), rows, title = size, -(-count // columns), 0.15 + _LINE * lines
-    left, right, bottom = room.get("left", 0.75), room.get("right", 0.2), room.get("bottom", 0.5)
-    across, up = room.get("between", 0.2 if "y" in shared else left), title + (0.0 if "x" in shared else bottom)
+    width, height = size
+    rows = -(-count // columns)
+    title = 0.15 + _LINE * lines
+    left = room.get("left", 0.75)
+    right = room.get("right", 0.2)
+    bottom = room.get("bottom", 0.5)
+    across = room.get("between", 0.2 if "y" in shared else left)
+    up = title + (0.0 if "x" in shared else bottom)
     wide = left + columns * width + (columns - 1) * across + right
     high = bottom + rows * height + (rows - 1) * up + title
     figure = Figure(figsize=(wide, high))
@@ -99,7 +110,8 @@ def distinct(count: int) -> list[dict[str, Any]]:
     looks = []
     for i, marker in enumerate(_MARKERS[:count]):
         left = 1 - i / (count - 1)
-        width, size = 1.2 + 0.9 * left, 3.2 + 2.0 * left
+        width = 1.2 + 0.9 * left
+        size = 3.2 + 2.0 * left
         face = {} if i % 2 == 0 else {"mfc": "w"}
         looks.append({"marker": marker, "ls": _DASHES[i % len(_DASHES)], "lw": width, "ms": size, **face})
     return looks
@@ -122,7 +134,8 @@ def label_panels(axes: Sequence[Axes], x: str = "", y: str = "") -> None:
 
 def colour_bar(mappable: Any, axes: Sequence[Axes], label: str, **options: Any) -> None:
     """Draw a colour bar at the right of some panels, in the margin of the figure."""
-    figure, box = axes[0].figure, Bbox.union([ax.get_position() for ax in axes])
+    figure = axes[0].figure
+    box = Bbox.union([ax.get_position() for ax in axes])
     inch = 1 / figure.get_figwidth()
     bar = figure.add_axes((box.x1 + 0.14 * inch, box.y0, 0.1 * inch, box.height))
     figure.colorbar(mappable, cax=bar, **options).set_label(label)

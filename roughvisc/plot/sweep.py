@@ -23,7 +23,8 @@ from roughvisc.study.sweep_table import ITSELF, REALISATION, statistics
 from roughvisc.variables import AXES, CONDUCTANCES, ROW, ROWS, STEPPED, VARIABLES, axis_of
 
 #: Largest number of panels, and of values of a key in a legend.
-_MOST_PANELS, _MOST_NAMED = 12, 12
+_MOST_PANELS = 12
+_MOST_NAMED = 12
 
 
 def swept_keys(results: xr.Dataset) -> dict[str, pd.Series]:
@@ -39,12 +40,15 @@ def swept_keys(results: xr.Dataset) -> dict[str, pd.Series]:
     for name in cases:
         first.setdefault(tuple(pd.factorize(cases[name], use_na_sentinel=False)[0]), name)
     dotted = {name: str(results[name].attrs.get("long_name", name)) for codes, name in first.items() if any(codes)}
-    words, keys = names_of(list(dotted.values())), {}
+    words = names_of(list(dotted.values()))
+    keys = {}
     for name, key in dotted.items():
-        values, label = cases[name], words[key]
+        values = cases[name]
+        label = words[key]
         if values.dtype.kind in "iuf" and np.isfinite(values).all() and not key.endswith("seed"):
             unit = style.middle_unit(values, str(results[name].attrs.get("units", "")))
-            shown, label = pd.Categorical(unit(values)), unit.label(label)
+            shown = pd.Categorical(unit(values))
+            label = unit.label(label)
         else:
             texts = [style.verbatim(value_text(key, value) or "none") for value in values]
             texts = [text if len(text) <= 40 else f"{text[:20]}…{text[-19:]}" for text in texts]
@@ -120,9 +124,11 @@ def sweep(results: xr.Dataset, quantity: str | None = None, *, along: str | None
     if along in keys:
         across = keys.pop(along).name
         others = [name for name in cases if name != across]
-        table, columns = _at_times(results[quantity], times), [across, *others[:1], "", *others[1:]]
+        table = _at_times(results[quantity], times)
+        columns = [across, *others[:1], "", *others[1:]]
     else:
-        table, columns = _curves(results, quantity, along), [along, *cases]
+        table = _curves(results, quantity, along)
+        columns = [along, *cases]
     table = table.join(cases, on="case") if len(cases) else table
     return _draw(table, results[quantity], columns, results[along] if along in curves else None)
 
@@ -165,18 +171,23 @@ def _at_times(values: xr.DataArray, times: Any = -1) -> pd.DataFrame:
 
 def _draw(table: pd.DataFrame, quantity: xr.DataArray, columns: list[str], over: xr.DataArray | None = None) -> Figure:
     """Draw a table of cases: the first column, or `over`, across; the next one as colours; the others as panels."""
-    name, (label, si) = str(quantity.name), style.described(quantity)
+    name = str(quantity.name)
+    label, si = style.described(quantity)
     table = table[np.isfinite(table[name])]
     if table.empty:
         raise InputError(f"{name} has no value to draw")
     unit = style.middle_unit(table[name][table[name] > 0] if name == "leak_rate" else table[name], si)
     table = table.assign(shown=unit(table[name]))
-    across, families, rest = columns[0], columns[1:2], columns[2:]  # families tell the lines of a panel apart
+    # families tell the lines of a panel apart
+    across = columns[0]
+    families = columns[1:2]
+    rest = columns[2:]
     while len(panels := _grouped(table, rest)) > _MOST_PANELS:
         families.append(rest.pop())
     titles = [_title(rest, levels) for levels, _ in panels]
     count = len(table[rest[-1]].cat.categories) if rest else 1
-    size, room = (2.1, 1.7) if count > 1 else (3.4, 2.0), {}
+    size = (2.1, 1.7) if count > 1 else (3.4, 2.0)
+    room = {}
     texts = list(table[across].cat.categories) if over is None and _is_text(table[across]) else []
     is_turned = style.LETTER * len(" ".join(texts)) > size[0]
     if is_turned:
@@ -261,14 +272,14 @@ def _draw_line(ax: Axes, line: pd.DataFrame, look: dict[str, Any], *, joined: bo
     # realisations with times of their own are interpolated to common times
     wide = line.pivot_table("shown", "across", REALISATION).interpolate("index", limit_area="inside").dropna()
     itself = wide.pop(ITSELF) if ITSELF in wide and wide.shape[1] > 1 else None
-    found = statistics(wide.to_numpy().T)
-    ends = wide.index, found["patch_lower"], found["patch_upper"]
+    summary = statistics(wide.to_numpy().T)
+    ends = wide.index, summary["patch_lower"], summary["patch_upper"]
     band = {"color": look["color"], "label": f"mean and 95 % prediction interval, {wide.shape[1]} realisations"}
     if joined and len(wide) > 1:
         ax.fill_between(*ends, alpha=0.22, lw=0, **band)
     else:
         ax.vlines(*ends, alpha=0.35, lw=5, **band)
-    ax.plot(wide.index, found["mean"], **look)
+    ax.plot(wide.index, summary["mean"], **look)
     if itself is not None:
         dashed = {"marker": "D", "mfc": "w", "ms": 4, "lw": 1.1, "ls": "--" if joined else "", "label": "measured scan"}
         ax.plot(itself.index, itself, **(look | dashed))
@@ -280,7 +291,8 @@ def sweep_figures(results: xr.Dataset) -> Iterator[tuple[str, str, Figure]]:
     A quantity that is the same in all cases, or equal to a swept key, is left out.
     """
     axis = axis_of(results.variables)
-    in_time, in_speed = ("contact_area", "leak_rate", *CONDUCTANCES), ("friction_coefficient", "contact_fraction")
+    in_time = ("contact_area", "leak_rate", *CONDUCTANCES)
+    in_speed = ("friction_coefficient", "contact_fraction")
     for name in in_speed if axis == "speed" else in_time:
         if name in results and results[name].any():
             caption = f"{VARIABLES[name].label} over {axis}, for each case."

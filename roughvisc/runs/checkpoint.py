@@ -64,8 +64,10 @@ class CheckpointWriter(Recorder):
         super().__init__()  # keeps the rows that are not in a file yet
         folder.mkdir(exist_ok=True)
         self._folder = folder
-        self._interval, self._stop = seconds, stop
-        self._is_saved, self._last_save = True, time.monotonic()
+        self._interval = seconds
+        self._stop = stop
+        self._is_saved = True
+        self._last_save = time.monotonic()
         self._ends = [0]  # first row of each file, and first row in memory
         self._waiting = 0  # size of the arrays in memory [byte]
         self._reading: tuple[int, Any] = -1, None  # the last file read stays open: rows are read in their order
@@ -87,7 +89,8 @@ class CheckpointWriter(Recorder):
             self._write_rows()
         if row.state is None:
             return
-        self.latest, self._is_saved = Checkpoint(row.state, row.done, len(self.plain), wall_time), False
+        self.latest = Checkpoint(row.state, row.done, len(self.plain), wall_time)
+        self._is_saved = False
         if self._stop is not None and self._stop():
             raise KeyboardInterrupt
         if time.monotonic() - self._last_save >= self._interval:
@@ -130,9 +133,11 @@ class CheckpointWriter(Recorder):
                 rows += _read(self._rows_path(number))[: end - len(rows)]
             if len(rows) != ends[-1]:
                 raise ValueError(f"found {len(rows)} of {ends[-1]} rows")
-            self.latest, self._is_saved = plain["reached"], True
+            self.latest = plain["reached"]
+            self._is_saved = True
             count = self.latest.rows  # rows after the state are computed again
-            self.plain, self._ends = rows[:count], [min(end, count) for end in ends]
+            self.plain = rows[:count]
+            self._ends = [min(end, count) for end in ends]
             log.info("%s: goes on from here", path)
         except InputError:
             raise
@@ -144,8 +149,10 @@ class CheckpointWriter(Recorder):
         """Delete all rows, because the run starts again."""
         super().restart()
         self._reading = -1, None
-        self.latest, self._is_saved = Checkpoint(), True
-        self._ends, self._waiting = [0], 0
+        self.latest = Checkpoint()
+        self._is_saved = True
+        self._ends = [0]
+        self._waiting = 0
         (self._folder / STATE).unlink(missing_ok=True)  # first, because it refers to the rows
         for path in self._folder.iterdir():
             path.unlink()
@@ -157,7 +164,8 @@ class CheckpointWriter(Recorder):
         began = time.monotonic()
         self._write_rows()  # before the state, which refers to the rows
         _write(self._folder / STATE, {"ends": self._ends, "reached": self.latest}, {})
-        self._is_saved, self._last_save = True, time.monotonic()
+        self._is_saved = True
+        self._last_save = time.monotonic()
         self._interval = max(self._interval, (self._last_save - began) / _SHARE)
 
     def remove(self) -> None:
@@ -176,10 +184,13 @@ class CheckpointWriter(Recorder):
         first = self._ends[-1]
         if first == len(self.plain):
             return
-        arrays = {f"{row}/{name}": one for row, found in enumerate(self._arrays, first) for name, one in found.items()}
+        arrays = {
+            f"{row}/{name}": one for row, variables in enumerate(self._arrays, first) for name, one in variables.items()
+        }
         _write(self._rows_path(len(self._ends) - 1), self.plain[first:], arrays)
         self._ends = [*self._ends, len(self.plain)]
-        self._arrays, self._waiting = [], 0
+        self._arrays = []
+        self._waiting = 0
 
     def _rows_path(self, number: int) -> Path:
         return self._folder / f"rows-{number:04d}.npz"
@@ -187,7 +198,8 @@ class CheckpointWriter(Recorder):
 
 def _write(path: Path, plain: Any, arrays: Mapping[str, Array]) -> None:
     """Write arrays, and plain values and states as JSON, which refers to the arrays in them; floats are exact."""
-    arrays, names = dict(arrays), dict[int, str]()
+    arrays = dict(arrays)
+    names = dict[int, str]()
 
     def encoded(value: Any) -> Any:
         if isinstance(value, np.generic):

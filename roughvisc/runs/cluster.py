@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import concurrent.futures
 import logging
+import math
 import secrets
 import signal
 import sys
@@ -36,9 +37,13 @@ log = logging.getLogger("roughvisc")
 
 #: Number of cases at the scheduler at a time, and least number for each worker. The first result does not wait until
 #: all cases are sent, and the memory of the scheduler does not grow with the sweep.
-_WINDOW, _CASES_AHEAD = 200, 4
+_WINDOW = 200
+_CASES_AHEAD = 4
 #: Time between two looks at finished cases, and for short cases. [s]
-_POLL_EVERY, _POLL_SHORT = 0.1, 0.02
+_POLL_EVERY = 0.1
+_POLL_SHORT = 0.02
+#: Time between two counts of the workers. [s]
+_COUNT_EVERY = 2.0
 #: Time between two reports of one case. [s]
 _REPORT_EVERY = 0.5
 #: Time for running cases to finish their step after an interrupt. [s]
@@ -76,6 +81,7 @@ def local_client(processes: int) -> Iterator[Client]:
         # a killed worker may take long to start again on a busy machine
         "distributed.deploy.lost-worker-timeout": "300s",
         "distributed.worker.profile.enabled": False,  # profiling slows the cases down
+        "distributed.admin.tick.interval": "1s",  # 20 ms by default in each of three servers, half of their idle cost
     }
     with dask.config.set(settings):
         try:
@@ -129,8 +135,8 @@ def require_same_version(client: Client) -> None:
         If a version differs; the message states the address of the worker and both versions.
     """
     here = metadata.version("roughvisc")
-    for address, found in client.get_versions(packages=["roughvisc"])["workers"].items():
-        version = found["packages"].get("roughvisc")
+    for address, about in client.get_versions(packages=["roughvisc"])["workers"].items():
+        version = about["packages"].get("roughvisc")
         if version != here:
             raise InputError(key=f"worker {address}", found=version, expected=f"roughvisc {here}, as in this process")
 
@@ -202,7 +208,8 @@ def distribute(
     settings = {"folder": str(folder), "stop_file": str(stop_file), "name": name, "threads": threads, "own": own}
     futures: dict[Future[Outcome], str] = {}
     workers: dict[str, list[str]] = {key: [] for key in cases}  # in the order in which they began each case
-    number, taken_over = count(), set[str]()
+    number = count()
+    taken_over = set[str]()
     finished = as_completed([], loop=client.loop)
 
     def submit(keys: Sequence[str]) -> None:
@@ -212,8 +219,8 @@ def distribute(
         finished.update(new)
 
     def heard(event: tuple[float, dict[str, Any]]) -> None:
-        key, worker, now, end = event[1].values()
-        if not end:
+        key, worker, begins, now, end = event[1].values()
+        if begins:
             if workers[key]:
                 log.info("%s: worker %s has gone, resumes on %s", key, workers[key][-1], worker)
                 display.say(f"worker {workers[key][-1]} has gone; the case resumes on {worker}", key)
@@ -224,11 +231,18 @@ def distribute(
     alone_since = time.monotonic()
     try:
         waiting = iter(cases)
+        left = len(cases)
+        ahead = _WINDOW
+        counted_at = -math.inf
         pause = _POLL_EVERY
         while True:
-            room = max(_WINDOW, _CASES_AHEAD * len(client.nthreads())) - len(futures)
-            if room > 0 and (keys := list(islice(waiting, room))):
+            if left and time.monotonic() - counted_at > _COUNT_EVERY:  # each question costs as much as a look
+                ahead = max(_WINDOW, _CASES_AHEAD * len(client.nthreads()))
+                counted_at = time.monotonic()
+            keys = list(islice(waiting, max(0, ahead - len(futures))))
+            if keys:
                 submit(keys)
+            left -= len(keys)
             if not futures:
                 break
             for future in finished.next_batch(block=False):
@@ -256,7 +270,8 @@ def distribute(
         display.say("stopping: the running cases finish their step; Ctrl-C again ends at once")
         with suppress(OSError):  # a full disk, or a lost scheduler
             stop_file.touch()
-            begun, until = [future for future, key in futures.items() if workers[key]], time.monotonic() + _PATIENCE
+            begun = [future for future, key in futures.items() if workers[key]]
+            until = time.monotonic() + _PATIENCE
             while time.monotonic() < until and client.nthreads() and not all(future.done() for future in begun):
                 time.sleep(0.1)
         raise
@@ -278,14 +293,16 @@ def _outcome(key: str, future: Future[Outcome]) -> Outcome:
     except (CancelledError, concurrent.futures.CancelledError):
         return Outcome(key, "interrupted")
     except KilledWorker as error:
-        name, place = "KilledWorker", error.last_worker.address
+        name = "KilledWorker"
+        place = error.last_worker.address
         message = (
             f"its worker was lost {error.allowed_failures + 1} times, the last at {place}: killed, out of memory "
             "(roughvisc plan says how much a case needs), or out of time; repeat the command to resume from the last "
             "checkpoint"
         )
     except Exception as error:  # noqa: BLE001  (such as a worker without roughvisc)
-        name, message = type(error).__name__, f"{type(error).__name__}: {error}"
+        name = type(error).__name__
+        message = f"{type(error).__name__}: {error}"
     return Outcome(key, "hindered", message, name)
 
 
@@ -310,16 +327,18 @@ def on_worker(
     from distributed import get_worker
 
     worker = get_worker()
-    task, last = worker.get_current_task(), 0.0
+    task = worker.get_current_task()
+    last = 0.0
     worker.loop.add_callback(_take_signals, worker, own)
     if own and not log.handlers:
         log.addHandler(logging.NullHandler())  # the process of the sweep displays the warnings of the result
 
-    def report(now: float, end: float) -> None:
+    def report(now: float, end: float, *, begins: bool = False) -> None:
         nonlocal last
-        if not end or time.monotonic() - last >= _REPORT_EVERY:
+        if begins or time.monotonic() - last >= _REPORT_EVERY:
             last = time.monotonic()
-            worker.log_event(name, {"key": key, "worker": worker.address, "now": float(now), "end": float(end)})
+            about = {"key": key, "worker": worker.address, "begins": begins, "now": float(now), "end": float(end)}
+            worker.log_event(name, about)
 
     def stop() -> bool:
         state = worker.state.tasks.get(task)  # None or cancelled if the client has closed
@@ -328,7 +347,7 @@ def on_worker(
     with _one_at_a_time:
         if stop():
             return Outcome(key, "interrupted")
-        report(0.0, 0.0)
+        report(0.0, 0.0, begins=True)
         try:
             if not Path(folder).is_dir():
                 raise RoughviscError(f"{folder}: does not exist")

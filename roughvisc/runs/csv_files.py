@@ -66,14 +66,19 @@ def to_table(out: str | Path) -> pd.DataFrame:
     ['converged']
     """
     folder = path_of(out, "out", "a folder of results; rv.to_csv takes a Dataset").absolute()
-    index, cases = index_of(folder), read_sweep(folder)
+    index = index_of(folder)
+    cases = read_sweep(folder)
     if not index and not cases:
         raise no_results(folder)
     cases = cases or {key: entry.case for key, entry in index.items()}
-    stated, numbers, ends = [*cases.values()], [], []
+    stated = [*cases.values()]
+    numbers = []
+    ends = []
     for key in cases:
         values: dict[str, float] = {}
-        status, message, entry = "not computed", "", index.get(key)
+        status = "not computed"
+        message = ""
+        entry = index.get(key)
         if entry is not None:
             status = "converged"
             row = AXES[entry.along].telling_row(entry.arrays)
@@ -84,7 +89,8 @@ def to_table(out: str | Path) -> pd.DataFrame:
                 known = filter(np.isfinite, entry.arrays.get(name, ()))
                 values[f"largest {heading(name, variable.units)}"] = max(known, default=np.nan)
         elif record := recorded_failure(folder, key):
-            status, message = "failed", str(record.get("message", ""))
+            status = "failed"
+            message = str(record.get("message", ""))
         numbers.append(values)
         ends.append({"status": status, "message": " ".join(message.split()), "file": entry.file if entry else ""})
     table = pd.DataFrame({"title": [str(case.get("title", "")) for case in stated]})

@@ -62,8 +62,8 @@ def result_files(folder: Path) -> list[Path]:
 
 def no_results(folder: Path) -> InputError:
     """Return the error of a path that is not a folder with results."""
-    found = "holds no results" if folder.is_dir() else "is a file" if folder.exists() else "does not exist"
-    return InputError(f"{folder}: {found}: expected a folder with results (.nc), as roughvisc run writes them")
+    state = "holds no results" if folder.is_dir() else "is a file" if folder.exists() else "does not exist"
+    return InputError(f"{folder}: {state}: expected a folder with results (.nc), as roughvisc run writes them")
 
 
 def results_at(place: Path) -> list[Path]:
@@ -162,7 +162,8 @@ def log_file(folder: Path) -> Iterator[None]:
     path = folder / LOG
     if os.path.lexists(path):
         regular(path, "a file for the log")
-    level, handler = log.level, _LogFile(path, encoding="utf-8", errors="backslashreplace")
+    level = log.level
+    handler = _LogFile(path, encoding="utf-8", errors="backslashreplace")
     handler.setFormatter(logging.Formatter(f"%(asctime)s {os.getpid()} %(levelname)s %(message)s"))
     log.addHandler(handler)
     log.setLevel(min(level or logging.INFO, logging.INFO))
@@ -208,8 +209,8 @@ def clean_folder(folder: str | Path, *, everything: bool = False) -> list[Path]:
 
     keys: dict[str, None] = {}
     for path in sorted(folder.iterdir()):
-        if found := _OF_A_CASE.match(path.name):
-            keys[found[1]] = None
+        if match := _OF_A_CASE.match(path.name):
+            keys[match[1]] = None
         elif path.match(".*.part*"):
             with suppress(OSError):
                 if time.time() - path.stat().st_mtime > _ABANDONED:
@@ -217,7 +218,8 @@ def clean_folder(folder: str | Path, *, everything: bool = False) -> list[Path]:
         elif everything and (path.match("*.nc.damaged") or path.match("*.failed.json")):
             remove(path)
     for key in keys:
-        lock, checkpoint = case_path(folder, key, "lock"), case_path(folder, key, "checkpoint")
+        lock = case_path(folder, key, "lock")
+        checkpoint = case_path(folder, key, "checkpoint")
         with suppress(OSError), lock_case(lock, patience=0.0):  # which also removes the lock
             resumes = (checkpoint / STATE).exists() and not case_path(folder, key, "result").exists()
             for path in sorted(folder.glob(f".{key}.*")):

@@ -48,7 +48,8 @@ _CHUNK = (8, 64, 64)
 #: Number of cells above which a chunk contains one frame, because several frames may exceed the memory; and this chunk.
 #: At 4096 x 4096 x 20, compressed, both times are in ms: (8, 64, 64) 2809 and 12; (2, 256, 256) 1277 and 51;
 #: (1, 256, 256) 331 and 41; (1, 1024, 1024) 309 and 302.
-_MANY_CELLS, _CHUNK_OF_MANY = 1 << 20, (1, 256, 256)
+_MANY_CELLS = 1 << 20
+_CHUNK_OF_MANY = (1, 256, 256)
 #: Longest side of a chunk of any other variable: a map of 1024 x 1024 doubles has 8 MB.
 _LONGEST_CHUNK = 1024
 #: Variables without missing values.
@@ -124,6 +125,29 @@ def open_without_steps(path: Path) -> xr.Dataset:
     return _opened(path, steps=False)
 
 
+def read_steps(path: Path) -> xr.Dataset | None:
+    """Read only the history of the steps of a result; None if it has none.
+
+    Raises
+    ------
+    InputError
+        If the file is absent, cannot be read, or is damaged.
+    """
+    require_result(path)
+    try:
+        with NETCDF, netCDF4.Dataset(**_named(path)) as file:
+            file.set_auto_maskandscale(False)
+            file.set_auto_chartostring(False)
+            return _steps(str(path), file)
+    except ERRORS as error:
+        raise unreadable(path, error) from error
+
+
+def _steps(path: str, file: netCDF4.Dataset) -> xr.Dataset | None:
+    """Return the history of the steps in an open result."""
+    return _dataset(path, file.groups[STEPS]).set_coords("time") if STEPS in file.groups else None
+
+
 def _opened(path: Path, **options: Any) -> xr.Dataset:
     """Open a result with options of :class:`ResultBackend`."""
     require_result(path)
@@ -131,7 +155,8 @@ def _opened(path: Path, **options: Any) -> xr.Dataset:
         dataset = xr.open_dataset(path, engine=ResultBackend, **options)
     except ERRORS as error:
         raise unreadable(path, error) from error
-    expected, rows = f"a result of roughvisc of format {RESULT_FORMAT}", axis_of(dataset.variables)
+    expected = f"a result of roughvisc of format {RESULT_FORMAT}"
+    rows = axis_of(dataset.variables)
     if (stated := dataset.attrs.get("result_format", RESULT_FORMAT)) != RESULT_FORMAT:
         raise unusable(path, f"is of format {stated}", expected)
     for name in AXES[rows].needed:
@@ -150,9 +175,9 @@ class ResultBackend(BackendEntrypoint):
             file.set_auto_maskandscale(False)
             file.set_auto_chartostring(False)
             result = _dataset(path, file).drop_vars(drop_variables or (), errors="ignore")
-            carried = _dataset(path, file.groups[STEPS]) if steps and STEPS in file.groups else None
+            carried = _steps(path, file) if steps else None
         if carried is not None:
-            result.encoding[CARRIED] = carried.set_coords("time")
+            result.encoding[CARRIED] = carried
         return result
 
 
@@ -249,7 +274,8 @@ def verify(place: str | Path) -> dict[Path, str]:
     InputError
         If the path does not exist, or the folder contains no result.
     """
-    place, flaws = path_of(place, "place", "a result, or of a folder of results"), {}
+    place = path_of(place, "place", "a result, or of a folder of results")
+    flaws = {}
     if not place.exists():
         raise InputError(f"{place}: does not exist: expected a result, or a folder of results")
     for path in results_at(place):
@@ -369,8 +395,8 @@ def save_result(dataset: xr.Dataset, path: str | Path, *, gap_part: float | None
         raise InputError(key="path", found=str(path), expected="a name that ends in .nc")
     declared = isinstance(dataset, xr.Dataset) and all(name in VARIABLES for name in dataset.data_vars)
     if not declared or not set(AXES) & set(dataset.dims) or "case" in dataset.dims:
-        found = list(dataset.sizes) if isinstance(dataset, xr.Dataset) else dataset
-        raise InputError(key="dataset", found=found, expected="a result of one case, as from rv.simulate")
+        given = list(dataset.sizes) if isinstance(dataset, xr.Dataset) else dataset
+        raise InputError(key="dataset", found=given, expected="a result of one case, as from rv.simulate")
     if gap_part is not None:
         dataset = _with_rounded_gap(dataset, number(gap_part, "1", "gap_part", above=0, most=1))
     return write_result(dataset, path)
@@ -388,20 +414,22 @@ def _with_rounded_gap(dataset: xr.Dataset, part: float) -> xr.Dataset:
     rounded = np.divide(gap.values, steps, where=steps > 0, out=gap.values.copy())
     rounded = np.where(steps > 0, np.round(rounded) * steps, gap.values)
     stated = gap.attrs | {"rounding": f"at most {part:g} of approach_error"}
-    found = dataset.assign(gap=(gap.dims, rounded, stated))
-    found.encoding = dataset.encoding
-    return found
+    packed = dataset.assign(gap=(gap.dims, rounded, stated))
+    packed.encoding = dataset.encoding
+    return packed
 
 
 def _declare(place: netCDF4.Dataset, part: xr.Dataset) -> list[tuple[netCDF4.Variable, xr.Variable]]:
     """Declare the variables of a file or a group; return each with the values to write."""
     place.setncatts(_readable(part.attrs))
     declared = []
+    coordinates = {*part.coords}
+    labels = [name for name in part.coords if name not in part.dims]
     for name, variable in part.variables.items():
         attributes = dict(variable.attrs)
-        if name in part.data_vars:  # CF names its coordinates in an attribute
-            for label_name, one in part.coords.items():
-                if label_name not in part.dims and set(one.dims) <= set(variable.dims):
+        if name not in coordinates:  # CF names its coordinates in an attribute
+            for label_name in labels:
+                if set(part.variables[label_name].dims) <= set(variable.dims):
                     attributes["coordinates"] = f"{attributes.get('coordinates', '')} {label_name}".lstrip()
         if variable.dtype.kind == "U":
             # characters along a dimension, as xarray and CF read text: netCDF4 1.7.5 crashes on strings of any length

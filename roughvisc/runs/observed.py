@@ -106,12 +106,12 @@ def _add(case: Case, path: Path) -> bool:
         frames = result.chunk({dim: 1 if dim == "time" else -1 for dim in result.dims})  # a block is a frame
         try:
             parts = [OBSERVABLES[name](frames, **arguments) for name, arguments in lacking.items()]
-            found = xr.merge(parts, compat="equals", join="exact").compute()
+            observables = xr.merge(parts, compat="equals", join="exact").compute()
         except InputError as error:
             raise error.prefixed(str(path)) from error
         known = json.loads(result.attrs.get(OBSERVED, "{}")) | lacking
-        whole = result.drop_vars(set(found.data_vars) & set(result.data_vars)).merge(
-            found, compat="equals", join="exact"
+        whole = result.drop_vars(set(observables.data_vars) & set(result.data_vars)).merge(
+            observables, compat="equals", join="exact"
         )
         whole.attrs = result.attrs | {"case": case.to_json(path.parent), OBSERVED: json.dumps(known)}
         write_result(whole, path)

@@ -45,7 +45,8 @@ _IN_THE_CASE = ("compliance_at_end", "poisson", "time_scale", "base")
 #: process, another run of the case), so that the same command resumes it; ``failed``: it would fail again.
 Kind = Literal["done", "failed", "hindered", "interrupted"]
 #: Errors of a case that another run computes, and of a full disk.
-IN_USE, FULL = errno.errorcode[errno.EWOULDBLOCK], ("ENOSPC", "EDQUOT")
+IN_USE = errno.errorcode[errno.EWOULDBLOCK]
+FULL = ("ENOSPC", "EDQUOT")
 #: Errors that refuse the input of a case.
 REFUSED = ("InputError", "EdgeContactError", "TooLargeError")
 
@@ -72,7 +73,8 @@ def result_folder(case: Case, out: str | Path | None = None) -> Path:
     else:
         folder = Path("results") / (re.sub(r"[^a-z0-9]+", "-", case.title.lower()).strip("-") or "untitled")
     if not (there := existing_part(folder)).is_dir():
-        key, expected = "out" if out is not None else "", "a folder for the results"
+        key = "out" if out is not None else ""
+        expected = "a folder for the results"
         text = f"{there}: is a file: expected {expected}"
         raise InputError(f"{key}: {text}" if key else text, key=key, found=out, expected=expected)
     return folder
@@ -102,7 +104,8 @@ def compute(
     title = case.title
     for key, value in case.varied.items():
         title += f", {key} = {json.dumps(value)}"
-    now, stated = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ"), case.to_json(folder)
+    now = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    stated = case.to_json(folder)
     ran = f"{now} {program_version()}: run of {case.origin.name if case.origin else 'a case'}"
     provenance = {
         "Conventions": dataset.attrs.pop("Conventions"),
@@ -254,11 +257,13 @@ def is_result_of(case: Case, path: Path) -> bool:
         return False
     try:
         with open_result(path) as dataset:
-            found = dataset.attrs.get("case_key")
+            stored_key = dataset.attrs.get("case_key")
     except DamagedError:
         return False
-    if found != case.key:
-        raise unusable(path, f"holds the result of case {found}", f"the result of case {case.key}, as its name says")
+    if stored_key != case.key:
+        raise unusable(
+            path, f"holds the result of case {stored_key}", f"the result of case {case.key}, as its name says"
+        )
     return True
 
 
@@ -303,19 +308,28 @@ def outcome_of(entry: Entry, *, seconds: float = 0.0, reused: bool = False) -> O
 
 def attempt(case: Case, folder: Path, *, progress: Callable[[float, float], None], **settings: Any) -> Outcome:
     """Run a case with some settings of :func:`run_case` and return its outcome; raise only ``KeyboardInterrupt``."""
-    began, kind, trace = time.perf_counter(), "hindered", ""
+    began = time.perf_counter()
+    kind = "hindered"
+    trace = ""
     try:
         path, entry = _run(case, folder, progress, **settings)
         return outcome_of(entry or read_entry(path), seconds=time.perf_counter() - began)
     except MemoryError as error:
-        name, advice = type(error).__name__, "roughvisc plan says how much a case needs, and fewer --workers leave more"
+        name = type(error).__name__
+        advice = "roughvisc plan says how much a case needs, and fewer --workers leave more"
         message = f"not enough memory; the last checkpoint is kept: {advice}"
     except OSError as error:  # for example a full disk, or another run of the case
-        name, place = errno.errorcode.get(error.errno or 0, "OSError"), f"{error.filename}: " if error.filename else ""
+        name = errno.errorcode.get(error.errno or 0, "OSError")
+        place = f"{error.filename}: " if error.filename else ""
         message = f"{place}{error.strerror or error}"
     except RoughviscError as error:
-        name, message, kind = type(error).__name__, str(error), "hindered" if error.transient else "failed"
+        name = type(error).__name__
+        message = str(error)
+        kind = "hindered" if error.transient else "failed"
     except Exception as error:  # noqa: BLE001  (an unexpected error of one case must not stop the others)
-        name, message, kind, trace = type(error).__name__, str(error), "failed", traceback.format_exc()
+        name = type(error).__name__
+        message = str(error)
+        kind = "failed"
+        trace = traceback.format_exc()
         message = f"{name}: {message}"
     return Outcome(case.key, kind, message, name, trace, time.perf_counter() - began)

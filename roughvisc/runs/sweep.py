@@ -36,11 +36,10 @@ from roughvisc.runs.folder import (
     log_file,
     record_failure,
     require_writable,
-    write_json,
 )
 from roughvisc.runs.observed import observe
 from roughvisc.runs.run import FULL, REFUSED, Outcome, attempt, outcome_of, result_folder, run_case
-from roughvisc.runs.sweep_data import SWEEP, index_of, numbers_of, open_results, require_own_folder, sweep_cases
+from roughvisc.runs.sweep_data import index_of, numbers_of, open_results, require_own_folder, write_sweep
 from roughvisc.solve import Progress
 from roughvisc.study.case import Case, cases_given
 
@@ -206,15 +205,16 @@ def run_cases(
     if count("workers", workers, 0) is not None and client is not None:
         raise InputError(key="workers", found=workers, expected="None together with a client")
     require_synchronous(client)
-    distinct, folder = {case.key: case for case in cases}, folder.absolute()
+    distinct = {case.key: case for case in cases}
+    folder = folder.absolute()
     require_writable(folder, "for the results")
     folder.mkdir(parents=True, exist_ok=True)
     clean_folder(folder)
     distinct = {key: case.stored(folder) for key, case in distinct.items()}
-    listed = sweep_cases(cases, folder)
     with log_file(folder):
-        write_json(folder / SWEEP, listed)
-        index, outcomes = index_of(folder), dict[str, Outcome]()
+        write_sweep(cases, folder)
+        index = index_of(folder)
+        outcomes = dict[str, Outcome]()
         for key in distinct:
             if entry := index.get(key):
                 outcomes[key] = outcome_of(entry, reused=True)
@@ -223,13 +223,13 @@ def run_cases(
         for key, case in distinct.items():
             if case.late_times:
                 log.info("%s: %s", key, case.note)
-        display.begin(cases, numbers_of(listed))
+        display.begin(cases, numbers_of({case.key: {"varied": dict(case.varied)} for case in cases}))
         for outcome in outcomes.values():
             display.ended(outcome)
         warned = set[str]()
         try:
-            with closing(_computed(todo, folder, display, client, workers, threads)) as found:
-                for outcome in found:
+            with closing(_computed(todo, folder, display, client, workers, threads)) as computed:
+                for outcome in computed:
                     outcomes[outcome.key] = outcome
                     _record(outcome, distinct[outcome.key], folder)
                     display.ended(outcome)

@@ -6,6 +6,7 @@ results if it is absent, damaged or older than the results.
 
 from __future__ import annotations
 
+import gzip
 import json
 import logging
 import os
@@ -25,17 +26,18 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from roughvisc.errors import InputError
-from roughvisc.labels import ATTRIBUTES, CARRIED, label, steps_of
+from roughvisc.labels import ATTRIBUTES, CARRIED, label
 from roughvisc.paths import path_of
 from roughvisc.runs.folder import (
     DAMAGED,
     KEY,
+    atomic_write,
     case_path,
     no_results,
     read_json,
     write_json,
 )
-from roughvisc.runs.netcdf import lazy, open_result, open_without_steps, read_variable
+from roughvisc.runs.netcdf import lazy, open_without_steps, read_steps, read_variable
 from roughvisc.study.case import Case, cases_given, identifier, labels_of, parameters_of
 from roughvisc.study.sweep_table import DRAWN, REALISATION
 from roughvisc.variables import AXES, ROW, ROWS, VARIABLES, axis_of
@@ -52,7 +54,8 @@ CASE_KEY = "case_key"
 #: Size of a block, which is read in one call: several frames of a small grid, one frame of a large grid. [byte]
 _BLOCK = 16 << 20
 #: Number of results from which a client reads them, and number for a task; reading one takes about 10 ms.
-_MANY, _TOGETHER = 200, 50
+_MANY = 200
+_TOGETHER = 50
 
 
 @dataclass(frozen=True)
@@ -138,8 +141,8 @@ def _plain(attributes: Mapping[Any, Any]) -> dict[str, Any]:
 
 
 def _stamp(path: Path) -> list[int]:
-    found = path.stat()
-    return [found.st_size, found.st_mtime_ns]
+    status = path.stat()
+    return [status.st_size, status.st_mtime_ns]
 
 
 def index_of(folder: Path, known: Iterable[Entry] = ()) -> dict[str, Entry]:
@@ -223,6 +226,23 @@ def sweep_cases(cases: Sequence[Case], folder: Path | None = None) -> dict[str, 
     return {key: json.loads(case.to_json(folder)) for key, case in {case.key: case for case in cases}.items()}
 
 
+def write_sweep(cases: Sequence[Case], folder: Path) -> None:
+    """Write the list of the cases of a sweep into its folder, one by one, because a hundred thousand may fill memory.
+
+    If writing fails, an existing list is not changed.
+    """
+    distinct = {case.key: case for case in cases}
+    with (
+        suppress(OSError, InputError),
+        atomic_write(folder / SWEEP) as temporary,
+        temporary.open("wb") as stored,
+        gzip.GzipFile("", "wb", compresslevel=1, fileobj=stored, mtime=0) as file,
+    ):
+        for number, (key, case) in enumerate(distinct.items()):
+            file.write(f"{', ' if number else '{'}{json.dumps(key)}: {case.to_json(folder)}".encode())
+        file.write(b"}")
+
+
 def read_sweep(folder: Path) -> dict[str, dict[str, Any]]:
     """Return key -> JSON of each case of the last sweep in a folder; empty without a sweep.
 
@@ -239,8 +259,8 @@ def read_sweep(folder: Path) -> dict[str, dict[str, Any]]:
     except InputError:
         raise
     except DAMAGED as error:
-        found = f"is damaged ({error})"
-        raise InputError(f"{path}: {found}: expected the cases of a sweep; run it again", key=SWEEP) from error
+        flaw = f"is damaged ({error})"
+        raise InputError(f"{path}: {flaw}: expected the cases of a sweep; run it again", key=SWEEP) from error
 
 
 def require_own_folder(cases: Sequence[Case], folder: Path) -> None:
@@ -276,12 +296,12 @@ def _names(title: str | None, origin: str | Path | None) -> set[str]:
 def numbers_of(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, int]:
     """Return the number of each case, from 0 in their order; the realisations of one case share its number."""
     numbers: dict[str, int] = {}
-    found = {}
+    number_of = {}
     for key, case in cases.items():
         varied = case.get("varied", {})
         settings = json.dumps({name: one for name, one in varied.items() if name not in (REALISATION, *DRAWN)})
-        found[key] = numbers.setdefault(settings if REALISATION in varied else key, len(numbers))
-    return found
+        number_of[key] = numbers.setdefault(settings if REALISATION in varied else key, len(numbers))
+    return number_of
 
 
 def open_results(out: str | Path, *, cases: Sequence[Case] | str | Path | None = None) -> xr.Dataset:
@@ -347,17 +367,18 @@ def open_results(out: str | Path, *, cases: Sequence[Case] | str | Path | None =
         raise no_results(folder)
     entries = [index[key] for key in listed if key in index]
     if len(axes := {entry.along: entry.file for entry in entries}) > 1:
-        found = ", ".join(f"{file} over {along}" for along, file in axes.items())
-        raise InputError(f"{folder}: found {found}: expected results over one axis; give cases", key="cases")
-    numbers, keys = numbers_of(listed), [entry.key for entry in entries]
+        listing = ", ".join(f"{file} over {along}" for along, file in axes.items())
+        raise InputError(f"{folder}: found {listing}: expected results over one axis; give cases", key="cases")
+    numbers = numbers_of(listed)
+    keys = [entry.key for entry in entries]
     parameters = {name: values[here] for name, values in parameters_of([*listed.values()]).items()}
     labels = labels_of(parameters, listed[keys[0]], ("case",)) | {
         "case": (("case",), np.array([numbers[key] for key in keys]), {"long_name": "number of the case"}),
         CASE_KEY: (("case",), np.array(keys), VARIABLES[CASE_KEY].attributes),
     }
-    found = _by_realisation(_stacked(folder, entries).assign_coords(labels), parameters)
-    found.encoding[CARRIED] = _Steps(folder)
-    return found
+    results = _by_realisation(_stacked(folder, entries).assign_coords(labels), parameters)
+    results.encoding[CARRIED] = _Steps(folder)
+    return results
 
 
 @dataclass
@@ -370,7 +391,7 @@ class _Steps:
     def __call__(self, key: str) -> xr.Dataset | None:
         """Return the history of the steps of a case."""
         if key not in self.read:
-            self.read[key] = steps_of(open_result(case_path(self.folder, key, "result")))
+            self.read[key] = read_steps(case_path(self.folder, key, "result"))
         return self.read[key]
 
 
@@ -473,7 +494,7 @@ def _by_realisation(flat: xr.Dataset, parameters: Mapping[str, NDArray[Any]]) ->
     texts = {name: "" for name, one in flat.variables.items() if one.dtype.kind in "UO"}
     runs = flat.drop_vars(["case", REALISATION, *settings]).rename_dims(case="run")
     runs = runs.assign_coords(xr.Coordinates.from_pandas_multiindex(pairs, "run"))
-    found = runs.unstack("run", fill_value=texts).transpose("case", REALISATION, ...)
-    found = found.assign_coords({name: of_cases.variables[name] for name in settings})
-    found[REALISATION].attrs["comment"] = "another patch of the same roughness; 0: the measured surface itself"
-    return found
+    unstacked = runs.unstack("run", fill_value=texts).transpose("case", REALISATION, ...)
+    unstacked = unstacked.assign_coords({name: of_cases.variables[name] for name in settings})
+    unstacked[REALISATION].attrs["comment"] = "another patch of the same roughness; 0: the measured surface itself"
+    return unstacked

@@ -272,8 +272,13 @@ def test_animate__gif_has_a_picture_for_each_frame(make, tmp_path):
     ds = make()
     path = plot.animate(ds, tmp_path / "contact.gif")
     assert list(tmp_path.iterdir()) == [path]
+    outline = np.array([int(style.OUTLINE[i : i + 2], 16) for i in (1, 3, 5)])
     with Image.open(path) as picture:
         assert getattr(picture, "n_frames", 1) == ds.sizes["time"]
+        picture.seek(ds.sizes["time"] - 1)
+        pixels = np.asarray(picture.convert("RGB"), float)
+    inside = pixels[pixels.shape[0] // 4 : -pixels.shape[0] // 4, pixels.shape[1] // 4 : pixels.shape[1] // 2]
+    assert (abs(inside - outline).max(axis=-1) < 60).any(), "a dark line around the contact"
 
 
 def test_animate__refuses_what_it_cannot_write(tmp_path, monkeypatch):

@@ -132,6 +132,16 @@ def test_scan_that_a_worker_cannot_read__fails_no_case(study, tmp_path):
     assert not list((tmp_path / "out").glob("*.failed.json"))
 
 
+def test_program_without_duration__begins_once_on_a_worker(tmp_path):
+    """A load that is instantaneous ends at time zero, which is not a start on another worker."""
+    height = rv.self_affine((1e-3, 1e-3), 8, hurst=0.8, rms_slope=0.1, seed=1)
+    case = rv.Case(height, rv.elastic(1e6, 0.5), rv.Program().load(1e-3, over=0), boundary="periodic")
+    with thread_workers(1) as client:
+        (outcome,) = run_cases([case], tmp_path, display=(ear := Ear()), client=client).values()
+    assert outcome.kind == "done"
+    assert not any("has gone" in line for line in ear.lines)
+
+
 def test_default_client__computes_sweeps_but_not_within_a_task(study, tmp_path):
     cases = study()
     with thread_workers(1) as client, client.as_current():
