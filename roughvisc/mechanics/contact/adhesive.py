@@ -32,6 +32,8 @@ Array = Any  # an array of NumPy or CuPy
 REACH = 36.0
 #: Largest change of a gap in one step, in ranges, in cells whose tension is at least this part of the largest one.
 LEAP, FELT = 1.0, 0.01
+#: Largest change of a gap from the given state to the first guess, in ranges.
+GUESSED = 0.5
 #: Change of the step length from one iteration to the next: smallest, largest, and largest after a cut step.
 SHRINK, GROW, GROW_AFTER_CUT = 0.3, 3.0, 1.3
 #: Longest step, in trials, and shortest one: a projected-gradient step replaces a shorter step.
@@ -48,6 +50,10 @@ ROUNDED = 1e-13
 
 class PulledOff(Exception):
     """The contact does not carry a negative load."""
+
+
+class Unstable(Exception):
+    """The energy has no minimum along a step: the given state may have been unstable."""
 
 
 class AdhesiveState(NamedTuple):
@@ -199,6 +205,7 @@ def solve_adhesive(
     start_gap: Array | None = None,
     least_size: float = 0.0,
     present: Array | None = None,
+    stops_if_unstable: bool = False,
     max_iterations: int = 5_000,
 ) -> AdhesiveState:
     """Return the contact state into which a given state relaxes under a given load or approach.
@@ -222,11 +229,14 @@ def solve_adhesive(
     start : array, shape (nx, ny), optional
         Pressure of the first guess. Default: the undeformed surface. [-]
     start_gap : array, shape (nx, ny), optional
-        Gap of the given state. Default: follows from pressure and approach. [m]
+        Gap of the given state. The first guess changes no gap by more than half the range. Default: follows from
+        pressure and approach. [m]
     least_size : float
         The error is relative to the integral of the absolute pressure, but at least to this value. [-]
     present : array of bool, shape (nx, ny), optional
         Cells with material. Default: all.
+    stops_if_unstable : bool
+        Whether to raise `Unstable` as soon as the energy has no minimum along a step.
     max_iterations : int
         Largest number of steps.
 
@@ -234,6 +244,8 @@ def solve_adhesive(
     ------
     PulledOff
         If the contact does not carry a negative load.
+    Unstable
+        If `stops_if_unstable`, and the given state may have been unstable.
     ConvergenceError
         If the tolerance is not reached.
     """
@@ -276,6 +288,8 @@ def solve_adhesive(
         curvature = elastic - inner(bend, change)
         best = min(-slope / curvature, LONGEST) if curvature > 0 else LONGEST
         is_unstable |= curvature <= 0
+        if is_unstable and stops_if_unstable:
+            raise Unstable
         fraction, was_cut = part_of_trial(body, gap, change, state, best)
         gap, fraction = descend(body, gap, change, state, fraction, slope - inner(state.tension, change), elastic)
         pressure += fraction * response
@@ -317,7 +331,13 @@ def first_guess(
         displaced += grid.filtered(pushed, body.symbol)
     gap = heights + displaced
     if start_gap is not None:
-        gap[cells] = xp.where(body.is_cell[cells], start_gap / reach, displaced[cells])
+        before = xp.where(body.is_cell[cells], start_gap / reach, displaced[cells])
+        guessed, touches = gap[cells], before == 0
+        if body.under_load and touches.any():  # the approach is unknown: contact cells remain in contact
+            guessed = guessed - float(guessed[touches].mean())
+        moved = before + xp.clip(guessed - before, -GUESSED, GUESSED)
+        remains = touches & (pushed[cells] > -1)
+        gap[cells] = xp.where(body.is_cell[cells], xp.where(remains, 0.0, moved), before)
     total = float(heights.sum()) - level * heights.size if body.keeps_mean else None
     return heights, body.cut(gap, total), level
 
