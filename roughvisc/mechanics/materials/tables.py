@@ -242,7 +242,7 @@ def dynamic_table(
     are fitted together by non-negative least squares, each relative to itself, or to a thousandth of ``|G*|`` where
     it is smaller. A large misfit means that the two moduli do not belong to one passive material.
 
-    The shift factors of several temperatures are those with which the storage moduli agree best with one positive
+    The shift factors of several temperatures are those with which the moduli agree best with one positive
     series (:func:`~roughvisc.mechanics.materials.superposition.superpose`). Between the measured temperatures
     ``log a_T`` is interpolated over ``1/T``. ``material.at(temperature)`` is the material at another temperature.
     """
