@@ -61,6 +61,10 @@ _COARSE, _COARSE_CURVE = 128, 48
 _STEPS_GROW, _WORK_GROWS, _CURVE_GROWS = 0.1, 0.4, 0.15
 #: Largest numbers of convolutions and steps of a coarse run. A time limit would depend on the load of the machine.
 _MOST_CONVOLUTIONS, _MOST_STEPS = 2500, 500
+#: Part of a program below which a run is repeated with a looser tolerance: the steps of the first contact tell nothing
+#: about later ones. Factor of the tolerance, its largest value, and the exponent of the tolerance in the number of
+#: steps (0.45 to 0.53 on a polymer with 18 exponentials, 1e-3 to 1e-1).
+_LITTLE, _LOOSER, _LOOSEST, _BY_TOLERANCE = 0.2, 100.0, 0.1, 0.5
 #: Largest number of speeds of a coarse friction curve, spread evenly over the speeds of the case.
 _FEW_SPEEDS = 7
 #: First step of a hold over the length of the hold. Later steps grow in proportion to the time.
@@ -197,10 +201,11 @@ class CoarseRun(NamedTuple):
     cells: int
 
 
-def coarse_run(own: Rows, case: Case) -> CoarseRun:
+def coarse_run(own: Rows, case: Case, looser: float = 1.0) -> CoarseRun:
     """Run a case on few cells, with its own tolerance and kept times, and time a convolution on its own grid.
 
-    A long run is stopped early, and its steps and its contact are extrapolated to the end of the program.
+    A long run is stopped early, and its steps and its contact are extrapolated to the end of the program. After a very
+    small part of the program the run is repeated with a looser tolerance.
 
     Parameters
     ----------
@@ -208,8 +213,12 @@ def coarse_run(own: Rows, case: Case) -> CoarseRun:
         Rows of the case on its own grid, not computed.
     case : Case
         The case.
+    looser : float
+        Tolerance of the run over the tolerance of the case.
     """
-    settings, experiment = replace(case.settings, fields=(), grid_error=False), case.experiment
+    tolerance = looser * case.settings.tolerance
+    settings = replace(case.settings, fields=(), grid_error=False, tolerance=tolerance)
+    experiment = case.experiment
     few, height, share = coarse_surface(own), solved(own), 1.0
     program = own.scene.program if isinstance(own, LoadingRows) else None
     if program is not None:
@@ -221,10 +230,12 @@ def coarse_run(own: Rows, case: Case) -> CoarseRun:
 
     spent = np.zeros((2, 2))  # steps and convolutions at rest, and in slides
     kept, contact, largest, force, before = 0, list[float](), 0.0, 0.0, 0.0
+    reached = list[float]()  # times of the steps
     with fft.set_workers(1):
         rows = experiment.rows(Problem(few, case.body, settings))
         began = time.thread_time()
         for row in rows:
+            reached.append(row.at)
             slides, total = False, before  # inside a pair of steps: its convolutions are counted at its end
             if program is None:
                 total += row.values["convolutions"]
@@ -240,7 +251,10 @@ def coarse_run(own: Rows, case: Case) -> CoarseRun:
                 if row.kept or slides:  # corners alone do not represent the kept times of a slide
                     contact.append(fraction)
             if program is not None and (total > _MOST_CONVOLUTIONS or spent[:, 0].sum() > _MOST_STEPS):
-                share, compliance = _part_done(program, row.at), case.body.material.contact_compliance
+                share, compliance = _part_done(program, reached), case.body.material.contact_compliance
+                is_chosen = isinstance(own, LoadingRows) and not own.scene.time_step
+                if share < _LITTLE and is_chosen and looser == 1 and tolerance < _LOOSEST:
+                    return coarse_run(own, case, min(_LOOSEST / tolerance, _LOOSER))
                 rest = sum(one.duration for one in program.segments if one.slide is None)
                 now, end = float(compliance(min(row.at, rest))), float(compliance(rest))
                 if force * now > 0:  # further loading, and creep except in slides
@@ -252,7 +266,7 @@ def coarse_run(own: Rows, case: Case) -> CoarseRun:
             beyond = max(timed_convolution(own, touching) - timed_convolution(rows, touching), 0.0)
 
     octaves, kept_part = max(math.log2(height.size / few.size) / 2, 0.0), kept / max(spent[:, 0].sum(), 1.0)
-    still, moving = spent[0] / share, spent[1]
+    still, moving = spent[0] / share * looser**_BY_TOLERANCE, spent[1]
     if isinstance(own, LoadingRows):
         cells = sum(one.slide.cells(spacing(few)) for one in own.scene.program.segments if one.slide is not None)
         step = moving / moving[0] if moving[0] else still / max(still[0], 1.0)
@@ -333,12 +347,20 @@ def coarse_surface(rows: Rows) -> xr.DataArray:
     return height.isel(x=slice(stride // 2, None, stride), y=slice(stride // 2, None, stride))
 
 
-def _part_done(program: Program, now: float) -> float:
-    """Return the part of the steps before a time [s] over all steps of a program, without slides. [-]
+def _part_done(program: Program, times: list[float]) -> float:
+    """Return the part of the steps up to now over all steps of a program, without slides. [-]
 
-    The steps of a hold are shorter at its start, and a cycle has two ramps per period.
+    The steps of a hold are shorter at its start, and a cycle has two ramps per period. The steps of a ramp grow too,
+    while the fast parts of the material relax.
+
+    Parameters
+    ----------
+    program : Program
+        The program.
+    times : list of float
+        Times of the steps up to now. [s]
     """
-    done = total = 0.0
+    now, done, total = times[-1], 0.0, 0.0
     for began, segment in zip(program.corners, program.segments, strict=False):
         if segment.slide is not None or segment.duration == 0:
             continue
@@ -347,8 +369,31 @@ def _part_done(program: Program, now: float) -> float:
             weight = 2 * segment.duration / segment.period
         elif segment.holds:
             part = math.log1p(part / _FIRST_STEP) / math.log1p(1 / _FIRST_STEP)
+        elif 0 < part < 1:
+            part = _part_of_ramp(np.array(times) - began, segment.duration)
         done, total = done + part * weight, total + weight
     return max(done / total, 1e-6) if total else 1.0
+
+
+def _part_of_ramp(times: NDArray[np.float64], duration: float) -> float:
+    """Return the part of the steps of a ramp that are done, from their numbers in the last two octaves of time. [-]
+
+    Parameters
+    ----------
+    times : ndarray
+        Times of the steps since the start of the ramp; before it negative. [s]
+    duration : float
+        Duration of the ramp. [s]
+    """
+    now = float(times[-1])
+    last, former = (np.count_nonzero((times > now / wide) & (times <= 2 * now / wide)) for wide in (2, 4))
+    octaves = math.log2(duration / now)
+    if former == 0:
+        return now / duration
+    growth = min(max(last / former, 1.0), 2.0)  # equal steps double in each octave, steps in proportion to time do not
+    rest = last * (octaves if growth == 1 else growth * (growth**octaves - 1) / (growth - 1))
+    done = np.count_nonzero(times > 0)
+    return float(done / (done + rest))
 
 
 def timed_convolution(rows: Rows, touching: float) -> float:
