@@ -81,7 +81,9 @@ def step_with_adhesion(
     ConvergenceError
         If the contact solver does not converge.
     """
-    grid, adhesion, alpha = scene.grid, scene.adhesion, prediction.compliance
+    grid = scene.grid
+    adhesion = scene.adhesion
+    alpha = prediction.compliance
     assert adhesion is not None
     unit = grid.cell_area / alpha
 

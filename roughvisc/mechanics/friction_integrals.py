@@ -85,7 +85,8 @@ class DirectionMeans:
             Wave number times speed times shift factor, positive. [rad/s]
         """
         logarithm = np.log(frequency)
-        low, high = float(logarithm.min()), float(logarithm.max())
+        low = float(logarithm.min())
+        high = float(logarithm.max())
         if low < self._range[0] or high > self._range[1]:
             self._tabulate(low, high)
         square, loss = (spline(logarithm) for spline in self._splines)
@@ -96,7 +97,8 @@ class DirectionMeans:
         if self._range[0] < math.inf:
             low = self._range[0] if low >= self._range[0] else low - _GROWS
             high = self._range[1] if high <= self._range[1] else high + _GROWS
-            low, high = min(low, self._range[0]), max(high, self._range[1])
+            low = min(low, self._range[0])
+            high = max(high, self._range[1])
         count = 8 + int((high - low) / math.log(10) * _PER_DECADE)
         grid = np.linspace(low, max(high, low + 1e-6), count)
         modulus = 1 / complex_compliance(self._material, np.exp(grid)[:, None] * self._cosines)
@@ -209,7 +211,8 @@ class FrictionIntegrals:
         if self._heating is None:
             friction, contact = self._friction(speed, np.ones(self._q.size))
             return SlidingWaves(friction, contact, cold, float(friction.sum()) * self._pressure * speed)
-        heating, radius = self._heating, float(self._heating.spot_radius or math.inf)
+        heating = self._heating
+        radius = float(self._heating.spot_radius or math.inf)
         spot = MovingSpot(radius, speed, heating.heat_conductivity, heating.volumetric_heat_capacity, self._q)
 
         def hotter(rise: Array) -> tuple[Array, SlidingWaves]:

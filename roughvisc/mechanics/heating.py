@@ -181,7 +181,8 @@ class MovingSpot:
         diffusivity = conductivity / capacity
         layer = math.sqrt(speed / (radius * diffusivity))  # inverse depth to which heat flows under a fast spot
         scales = [1 / radius, layer, *wave_numbers[np.isfinite(wave_numbers)].tolist()]
-        low, high = math.log(min(scales) / _MARGIN), math.log(max(scales) * _MARGIN)
+        low = math.log(min(scales) / _MARGIN)
+        high = math.log(max(scales) * _MARGIN)
         k = np.exp(np.linspace(low, high, 2 + int((high - low) / _STEP)))
         x, share = _disc()
         flow = np.square(diffusivity * (k[:, None] ** 2 + (x / radius) ** 2)) + np.square(x * (speed / radius))

@@ -120,7 +120,9 @@ class Elastic:
     """
 
     def __init__(self, grid: Grid, work: float, reach: float, load: float | None, present: Array | None) -> None:
-        xp, self.grid, self.under_load = grid.xp, grid, load is not None
+        xp = grid.xp
+        self.grid = grid
+        self.under_load = load is not None
         self.cells = slice(0, grid.shape[0]), slice(0, grid.shape[1])
         self.is_cell = xp.zeros(grid.points, bool)
         self.is_cell[self.cells] = True if present is None else present
@@ -249,11 +251,19 @@ def solve_adhesive(
     ConvergenceError
         If the tolerance is not reached.
     """
-    body, peak = Elastic(grid, work, reach, load, present), work / reach
+    body = Elastic(grid, work, reach, load, present)
+    peak = work / reach
     heights, gap, level = first_guess(body, given / reach, approach / reach, start, start_gap, peak, reach)
     pressure = body.pressure(gap - heights, level)
-    length, error, is_unstable, stalled, lowest = 1.0, math.inf, False, 0, math.inf
-    requested, last_decrement, last, steepest = math.nan, math.nan, None, float(body.stiffness.max())
+    length = 1.0
+    error = math.inf
+    is_unstable = False
+    stalled = 0
+    lowest = math.inf
+    requested = math.nan
+    last_decrement = math.nan
+    last = None
+    steepest = float(body.stiffness.max())
     for iteration in range(max_iterations + 1):
         state = balance(body, gap, pressure)
         pulls = load is not None and load < 0 and bool(state.is_open.all())
@@ -273,17 +283,21 @@ def solve_adhesive(
         lowest, stalled = (decrement, 0) if decrement < lowest / 2 else (lowest, stalled + 1)
 
         direction = conjugate(body, step, state, last)
-        change, slope = None, 0.0
+        change = None
+        slope = 0.0
         if stalled <= PATIENCE:
             change, slope, length = trial(body, gap, step, direction, state, length)
         if change is None:  # a projected-gradient step always descends
             total_gap = float(gap.sum()) if body.keeps_mean else None
             change = body.cut(gap - state.residual * state.free / steepest, total_gap) - gap
-            length, lowest, stalled = 1.0, decrement, 0
+            length = 1.0
+            lowest = decrement
+            stalled = 0
             slope = inner(change, state.residual)
             if not slope < 0:
                 break  # the minimum, to rounding
-        response, bend = body.response(change), state.tension * change
+        response = body.response(change)
+        bend = state.tension * change
         elastic = inner(change, response)
         curvature = elastic - inner(bend, change)
         best = min(-slope / curvature, LONGEST) if curvature > 0 else LONGEST
@@ -293,7 +307,8 @@ def solve_adhesive(
         fraction, was_cut = part_of_trial(body, gap, change, state, best)
         gap, fraction = descend(body, gap, change, state, fraction, slope - inner(state.tension, change), elastic)
         pressure += fraction * response
-        requested, last_decrement = float(abs(response).sum()) / length, max(decrement, 1e-300)
+        requested = float(abs(response).sum()) / length
+        last_decrement = max(decrement, 1e-300)
         last = Previous(change, response - bend, curvature) if curvature > 0 else None
         length *= min(max(best, SHRINK), GROW_AFTER_CUT if was_cut else GROW)
 
@@ -302,7 +317,8 @@ def solve_adhesive(
     displaced = gap - heights
     if body.under_load:
         level = body.uniform * body.mean_response - float(displaced.mean())
-    cells, xp = body.cells, grid.xp
+    cells = body.cells
+    xp = grid.xp
     net = xp.where(state.is_open, -state.tension, pressure - state.mean)[cells] * peak
     apart = xp.where(body.is_cell, gap, math.inf)[cells] * reach
     displacement = (displaced + level)[cells] * reach
@@ -319,7 +335,8 @@ def first_guess(
     reach: float,
 ) -> tuple[Array, Array, float]:
     """Return the heights of the gap without displacement, the gap of the given state, and the approach."""
-    grid, cells = body.grid, body.cells
+    grid = body.grid
+    cells = body.cells
     xp = grid.xp
     heights = xp.zeros(grid.points)
     heights[cells] = given
@@ -332,7 +349,8 @@ def first_guess(
     gap = heights + displaced
     if start_gap is not None:
         before = xp.where(body.is_cell[cells], start_gap / reach, displaced[cells])
-        guessed, touches = gap[cells], before == 0
+        guessed = gap[cells]
+        touches = before == 0
         if body.under_load and touches.any():  # the approach is unknown: contact cells remain in contact
             guessed = guessed - float(guessed[touches].mean())
         moved = before + xp.clip(guessed - before, -GUESSED, GUESSED)
@@ -372,7 +390,8 @@ def trial(
         slope = inner(change, state.residual)
         if slope < 0:
             return change, slope, length
-        length, direction = length / 4, step
+        length = length / 4
+        direction = step
     return None, 0.0, length
 
 
@@ -407,7 +426,8 @@ def descend(
     linear, elastic : float
         Derivative of the energy without attraction along the trial, and its second derivative.
     """
-    xp, before = body.grid.xp, float(state.tension.sum())
+    xp = body.grid.xp
+    before = float(state.tension.sum())
     while True:
         moved = gap + fraction * change
         moved = xp.where(body.is_cell, xp.maximum(moved, 0), moved)

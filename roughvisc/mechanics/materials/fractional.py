@@ -91,7 +91,8 @@ def fractional_creep(
     """
     step = _STEP * exponent
     w = np.arange(-_END, _END + step / 2, step)
-    p, rest = 1 / (1 + np.exp(-w)), 1 / (1 + np.exp(w))
+    p = 1 / (1 + np.exp(-w))
+    rest = 1 / (1 + np.exp(w))
     weights = step * p * rest
     angle = exponent * np.pi
     ratio = np.log(np.sin(angle * p)) - np.log(np.sin(angle * rest)) - np.log(instantaneous / equilibrium)

@@ -119,9 +119,11 @@ class Superposition:
     def reduced(self) -> tuple[Array, dict[str, Array]]:
         """Return frequency or time, and the values of the rows, at the reference temperature."""
         sign = -1.0 if {"creep", "relaxation"} & self.values.keys() else 1.0
-        at = self.at * 10 ** (sign * self.log_shift)[self.group]
+        reduced_at = self.at * 10 ** (sign * self.log_shift)[self.group]
         moduli = _moduli(self.temperatures, self.reference, self.vertical)[self.group]
-        return at, {name: row * moduli if name == "creep" else row / moduli for name, row in self.values.items()}
+        return reduced_at, {
+            name: row * moduli if name == "creep" else row / moduli for name, row in self.values.items()
+        }
 
     @property
     def scatter(self) -> float:
@@ -166,8 +168,10 @@ class Superposition:
         where = f"The shift factor at {self.temperatures[worst] - 273.15:.1f} degC is uncertain by"
         if split[worst] < uncertain[worst]:
             return f"{where} {uncertain[worst]:.2g} decades: the rows of neighbouring temperatures hardly overlap."
-        found = f"{where} {uncertain[worst]:.2g} decades, half the difference of the shifts from storage and from loss"
-        return f"{found}: the material is not thermorheologically simple there, or `vertical` is another."
+        uncertainty = (
+            f"{where} {uncertain[worst]:.2g} decades, half the difference of the shifts from storage and from loss"
+        )
+        return f"{uncertainty}: the material is not thermorheologically simple there, or `vertical` is another."
 
 
 def groups_of(temperatures: Array) -> tuple[Array, NDArray[np.intp]]:
@@ -219,7 +223,8 @@ def superpose(
     for name, value in values.items():
         scale = np.hypot(np.maximum(value, least), _OF_SIZE * size)
         rows.append(_Rows(name, at, group, value, scale, reference))
-    moduli, measured = _moduli(means, reference, known), rows[0]
+    moduli = _moduli(means, reference, known)
+    measured = rows[0]
     shifts, sigma, misfit = measured.shifts(measured.guess(rows), moduli)
     split = np.full(means.size, np.nan)
     if len(rows) == 2:
@@ -283,16 +288,17 @@ class _Rows:
         shifts = np.zeros(count)
         offered = np.linspace(*_GUESSED, int(_GUESSES * (_GUESSED[1] - _GUESSED[0])) + 1) * _DECADE
         for number in range(count - 1):
-            first, second = self.group == number, self.group == number + 1
+            first = self.group == number
+            second = self.group == number + 1
             costs = []
             for shift in offered:
                 x = np.log(np.concatenate([self.at[first], self.at[second]]))
                 x[np.count_nonzero(first) :] += self.sign * shift
                 basis = np.linalg.qr(np.vander((x - x.mean()) / max(np.ptp(x), 1e-12), min(4, x.size)))[0]
                 cost = 0.0
-                for one in rows:
-                    y = np.concatenate([one.values[first], one.values[second]])
-                    y = np.log(np.maximum(y, 1e-3 * one.scale.min()))
+                for measured in rows:
+                    y = np.concatenate([measured.values[first], measured.values[second]])
+                    y = np.log(np.maximum(y, 1e-3 * measured.scale.min()))
                     cost += float(np.sum((y - basis @ (basis.T @ y)) ** 2))
                 costs.append(cost)
             shifts[number + 1] = shifts[number] + offered[int(np.argmin(costs))]
@@ -308,12 +314,14 @@ class _Rows:
         moduli : ndarray
             Factor of the moduli at each temperature.
         """
-        shifts, free = start, np.flatnonzero(np.arange(start.size) != self.reference)
+        shifts = start
+        free = np.flatnonzero(np.arange(start.size) != self.reference)
         damping = 1e-3
         fit = self._fit(shifts, moduli)
         for _ in range(_MOST):
             jacobian = fit.jacobian(self.group, free)
-            normal, gradient = jacobian.T @ jacobian, jacobian.T @ fit.residual
+            normal = jacobian.T @ jacobian
+            gradient = jacobian.T @ fit.residual
             scale = np.diag(np.diag(normal) + 1e-12 * np.trace(normal) + 1e-300)
             for _ in range(_DAMPINGS):
                 change = np.linalg.solve(normal + damping * scale, -gradient)
@@ -326,7 +334,9 @@ class _Rows:
             else:
                 break
             gain = fit.cost - better.cost
-            shifts, fit, damping = trial, better, max(damping / 10, 1e-9)
+            shifts = trial
+            fit = better
+            damping = max(damping / 10, 1e-9)
             if gain < _DONE * fit.cost:
                 break
         sigma = np.zeros(start.size)
@@ -387,20 +397,22 @@ def _terms(quantity: Quantity, at: Array, times: Array) -> tuple[Array, Array]:
     """Return the columns of a series at frequencies or times, and their derivatives by the logarithm of these."""
     if quantity == "storage and loss":
         half = at.size // 2
-        storage, loss = _terms("storage", at[:half], times), _terms("loss", at[half:], times)
+        storage = _terms("storage", at[:half], times)
+        loss = _terms("loss", at[half:], times)
         none = np.zeros((half, 1))
-        stacked = [np.vstack([one, np.hstack([none, other])]) for one, other in zip(storage, loss, strict=True)]
+        stacked = [np.vstack([above, np.hstack([none, below])]) for above, below in zip(storage, loss, strict=True)]
         return stacked[0], stacked[1]
-    one, zero = np.ones((at.size, 1)), np.zeros((at.size, 1))
+    ones = np.ones((at.size, 1))
+    zero = np.zeros((at.size, 1))
     if quantity in ("storage", "loss"):
         x = at[:, None] * times
         below = 1 + x**2
         if quantity == "storage":
-            return np.hstack([one, x**2 / below]), np.hstack([zero, 2 * x**2 / below**2])
+            return np.hstack([ones, x**2 / below]), np.hstack([zero, 2 * x**2 / below**2])
         return x / below, x * (1 - x**2) / below**2
     x = at[:, None] / times
     decay = np.exp(-x)
     if quantity == "relaxation":
-        return np.hstack([one, decay]), np.hstack([zero, -x * decay])
+        return np.hstack([ones, decay]), np.hstack([zero, -x * decay])
     flow = at[:, None] / at.max()
-    return np.hstack([one, flow, -np.expm1(-x)]), np.hstack([zero, flow, x * decay])
+    return np.hstack([ones, flow, -np.expm1(-x)]), np.hstack([zero, flow, x * decay])
