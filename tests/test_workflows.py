@@ -71,7 +71,9 @@ def test_moving_line__needs_the_work_of_the_theory(tmp_path, script):
     rows = script("moving_line").main(tmp_path / "line.png", speeds=(0.1, 1.0), holds=(0.1, 10.0), cells=48)
     for name, _, work, theory in rows[:2]:
         assert work == pytest.approx(theory, rel=0.3), name
-    assert (rows[3][2][1] > 1.2 * rows[3][2][0]) and (rows[2][2][1] < 1.1 * rows[2][2][0]), "a fast pull-off remembers"
+    slow, fast = (row[2][1] / row[2][0] for row in rows[2:])
+    assert slow < 1.1, "a slow pull-off does not depend on the hold"
+    assert fast > 1.2
 
 
 def test_thin_sheet__is_stiffer_than_a_half_space_the_more_the_deeper_the_ball(tmp_path, script):
