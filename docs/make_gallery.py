@@ -83,6 +83,7 @@ SCRIPTS = {
     "zener_step": ["zener_step.py", "128"],
     "thin_sheet": ["thin_sheet.py", "128"],
     "coating": ["coating.py", "80"],
+    "moving_line": ["moving_line.py"],
     "tyre_on_asphalt": ["tyre_on_asphalt.py"],
     "stability_map": ["stability_map.py"],
     "measured_rolling": ["measured_and_computed.py", "rolling"],
@@ -91,7 +92,7 @@ SCRIPTS = {
     "measured_bead": ["measured_and_computed.py", "bead", "fmt-chiaro-txt_AEBP1_Indentation_002.txt"],
 }  # fmt: skip
 IN_THE_GALLERY = (
-    "maxwell_step", "zener_step", "thin_sheet", "coating", "tyre_on_asphalt", "stability_map",
+    "maxwell_step", "zener_step", "thin_sheet", "coating", "moving_line", "tyre_on_asphalt", "stability_map",
 )  # fmt: skip
 NOTEBOOK = "first_contact"
 #: Picture of the gallery -> its text for readers who do not see it, and what to look for.
@@ -208,6 +209,12 @@ SEEN = {
         "speed for five thicknesses",
         "Left: waves shorter than about twice the thickness (dashed line) deform the coating alone. Right: a coating of "
         "20 µm acts nearly as a half-space; one of 2 µm has a quarter of its contact at low speed.",
+    ),
+    "moving_line": (
+        "Left, work of a moving contact line against its speed: points near a rising and a falling line; right, "
+        "pull-off against the time of hold for two speeds",
+        "Left: a line that recedes fast needs more than the work of adhesion, one that advances gains less; nothing is "
+        "fitted. Right: a fast pull-off remembers how long the contact was held, a slow one does not.",
     ),
     "tyre_on_asphalt": (
         "Friction against speed at five temperatures, temperature of the contact, and contribution of each decade of "

@@ -65,6 +65,17 @@ def test_verification_script__draws_profiles_on_the_closed_form(name, tmp_path, 
             assert np.asarray(p)[inside] == pytest.approx(np.interp(r[inside], *line.get_data()), rel=0.03)
 
 
+@pytest.mark.thorough
+def test_moving_line__needs_the_work_of_the_theory(tmp_path, script):
+    """A line that recedes needs more than the work of adhesion, one that advances gains less."""
+    rows = script("moving_line").main(tmp_path / "line.png", speeds=(0.1, 1.0), holds=(0.1, 10.0), cells=48)
+    for name, _, work, theory in rows[:2]:
+        assert work == pytest.approx(theory, rel=0.3), name
+    slow, fast = (row[2][1] / row[2][0] for row in rows[2:])
+    assert slow < 1.1, "a slow pull-off does not depend on the hold"
+    assert fast > 1.2
+
+
 def test_thin_sheet__is_stiffer_than_a_half_space_the_more_the_deeper_the_ball(tmp_path, script):
     lines = script("thin_sheet").main(cells=21, figure=tmp_path / "figure.png").axes[0].lines
     ratio = {line.get_label(): line.get_ydata() for line in lines}["computed"]

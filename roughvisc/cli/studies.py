@@ -276,6 +276,8 @@ def trade(study: Path, out: Path | None, accuracy: str, quantity: str | None, qu
 )
 @quantity("--modulus-error", "PART", "Relative error of the moduli at 95 %: 10%.")
 @quantity("--time-scale-error", "PART", "Relative error of the times of the material at 95 %.")
+@quantity("--work-error", "PART", "Relative error of the work of adhesion at 95 %.")
+@quantity("--range-error", "PART", "Relative error of the range of the attraction at 95 %.")
 @quantity("--cutoff", "LENGTH", "Shortest wavelength that the real surface has: '2 um'.")
 @click.option(
     "--population",

@@ -150,9 +150,7 @@ def with_grid_error(
         return dataset.assign(dict.fromkeys(columns, missing))
     largest = {name: float(np.fmax.reduce(np.abs(dataset[name].values), initial=_ZERO)) for name in histories}
     if "adhesive_force" in dataset:  # pressure and tension may cancel
-        cell_area = math.prod(spacing(height, "height"))
-        sizes = [float(np.nansum(np.abs(frame.values))) * cell_area for frame in dataset["pressure"]]
-        largest["force"] = max(largest["force"], *sizes)
+        largest["force"] = max(largest["force"], *pressure_size(dataset))
     off = {name: np.abs(coarse[name].values - dataset[name].values) for name in histories}
     apart = {"pressure": pressure_distance(coarse, dataset) / largest["force"]}
     apart |= {name: off[name] / largest[name] for name in histories}
@@ -400,6 +398,12 @@ def coarser(height: xr.DataArray, factor: float, boundary: Boundary) -> xr.DataA
     few = remade(height, coarser_shape(shape, factor, True))
     periodic = {"periodic": True, "mirror": False}.get(boundary)
     return resample(height, coarser_shape(shape, factor, False), periodic=periodic) if few is None else few
+
+
+def pressure_size(dataset: xr.Dataset) -> Array:
+    """Return the integral of the absolute pressure of a result at each time. [N]"""
+    cell_area = math.prod(spacing(dataset["height"], "height"))
+    return np.array([float(np.nansum(np.abs(frame.values))) * cell_area for frame in dataset["pressure"]])
 
 
 def pressure_distance(found: xr.Dataset, wanted: xr.Dataset) -> Array:

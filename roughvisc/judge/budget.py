@@ -45,7 +45,7 @@ Population = Literal["patch", "ensemble"]
 #: Keyword arguments of the observables, as ``[observe]`` of a study states them.
 Observe = Mapping[str, Mapping[str, Any]]
 #: Inputs of a budget that the user has to state.
-KNOWN = ("modulus_error", "time_scale_error", "cutoff", "population")
+KNOWN = ("modulus_error", "time_scale_error", "work_error", "range_error", "cutoff", "population")
 #: Folder of the further solves of a budget, in the folder of the results.
 FOLDER = "budget"
 STEPS = "time steps and solver"
@@ -54,6 +54,8 @@ SAMPLE = "sample"
 OCTAVE = "next octave of waves"
 MODULUS = "modulus"
 TIME_SCALE = "time scale"
+WORK = "work of adhesion"
+RANGE = "range of adhesion"
 #: Recipes that give the same surface on any grid.
 _ANY_GRID = ("sphere", "cone", "flat_punch", "wavy")
 #: Relative change of a modulus or a time scale, for the derivative of a number.
@@ -324,6 +326,15 @@ def coarser_grids(base: Case, height: xr.DataArray, coarsening: float) -> tuple[
     return tuple(coarser)
 
 
+def finer_grid(base: Case, height: xr.DataArray, coarsening: float) -> tuple[Neighbour, ...]:
+    """Return a case with adhesion on its own cells, against cells half as long.
+
+    Longer cells may not resolve the range of the attraction. The parameters are those of :func:`coarser_grids`.
+    """
+    own, fine = (on_cells(base, height, part * coarsening) for part in (1.0, 0.5))
+    return (Neighbour(own, GRID_SAFETY, fine, 1.0),)
+
+
 def sources_of(
     base: Case, height: xr.DataArray, known: Mapping[str, Any], coarsening: float = 1.0, others: float | None = None
 ) -> dict[str, Source]:
@@ -352,18 +363,20 @@ def sources_of(
         cutoff = number(cutoff, "m", "cutoff", above=0)
     sample = is_sample(base, height)
     others = others or coarsening
-    grids = coarser_grids(base, height, coarsening)
-    own, coarse = (on_cells(base, height, part * others) for part in (1.0, 2.0))
-    sources = {
-        STEPS: Source("errors that the result states"),
-        GRID: Source("cells twice and four times as long", grids),
-    }
+    attracts = base.settings.adhesion
+    sticks = attracts is not None
+    own, coarse = (on_cells(base, height, part * others) for part in (1.0, 1.0 if sticks else 2.0))
+    sources = {STEPS: Source("errors that the result states")}
+    if sticks:
+        sources[GRID] = Source("cells half as long", finer_grid(base, height, coarsening))
+    else:
+        sources[GRID] = Source("cells twice and four times as long", coarser_grids(base, height, coarsening))
 
     if sample and population == "ensemble":
-        few = [max(2, round(n / (2 * others))) for n in height.shape]
+        few = list(coarse.height().shape) if sticks else [max(2, round(n / (2 * others))) for n in height.shape]
         patches = [changed(base, {"surface.resample": few, "surface.realisation": n + 1}) for n in range(_PATCHES)]
         near = tuple(Neighbour(patch, _SAMPLE_FACTOR, coarse) for patch in patches)
-        sources[SAMPLE] = Source(f"{_PATCHES} Gaussian surrogates on cells twice as long", near)
+        sources[SAMPLE] = Source(f"{_PATCHES} Gaussian surrogates" + " on cells twice as long" * (not sticks), near)
     if sample and cutoff is None:
         sources[OCTAVE] = Source("cutoff is not given: the shortest wavelength that the real surface has", is_open=True)
     elif sample:
@@ -386,8 +399,18 @@ def sources_of(
     slower: dict[str, Any] = {f"material.{key}": None for key in split_thermal(material)[0]}
     slower["material.shift_factor"] = _CHANGE * shift_factor(material)
     creeps = base.material.contact_compliance(math.inf) > base.material.contact_compliance(0.0)
-    for name, what, changes in ((MODULUS, "moduli", stiffer), (TIME_SCALE, "times of the material", slower)):
-        key = f"{name.replace(' ', '_')}_error"
+    inputs = [
+        (MODULUS, "modulus_error", "moduli", stiffer),
+        (TIME_SCALE, "time_scale_error", "times of the material", slower),
+    ]
+    if attracts is not None:  # less work and a longer range need no shorter cells
+        work = attracts.work
+        reach = attracts.range
+        of_work = {"adhesion.work": work / _CHANGE, "adhesion.range": reach, "adhesion.strength": None}
+        of_range = {"adhesion.work": work, "adhesion.range": _CHANGE * reach, "adhesion.strength": None}
+        inputs += [(WORK, "work_error", "work of adhesion", of_work)]
+        inputs += [(RANGE, "range_error", "range of the attraction", of_range)]
+    for name, key, what, changes in inputs:
         if (error := known.get(key)) is not None:
             error = number(error, "1", key, least=0, below=1)
         if name == TIME_SCALE and not creeps:
@@ -398,7 +421,8 @@ def sources_of(
         elif error > 0:
             weight = math.log1p(error) / math.log(_CHANGE)
             one = Neighbour(changed(compared, changes), weight, compared)
-            sources[name] = Source(f"{what} {100 * (_CHANGE - 1):.0f} % larger", (one,))
+            sense = "smaller by the factor 1.1" if name == WORK else f"{100 * (_CHANGE - 1):.0f} % larger"
+            sources[name] = Source(f"{what} {sense}", (one,))
     return sources
 
 
@@ -505,7 +529,8 @@ def _budget(
     value = values[case.key]
     half_width, direction = np.zeros((2, len(sources), value.size))
     with np.errstate(divide="ignore", invalid="ignore"):
-        logarithms = {key: np.log(one) for key, one in values.items()}
+        # a tension or a negative approach has the logarithm of its size; after a change of sign there is none
+        logarithms = {key: np.log(np.where(one * value < 0, math.nan, np.abs(one))) for key, one in values.items()}
         for i, (name, source) in enumerate(sources.items()):
             change = [
                 n.weight_of(quantity) * (logarithms[n.case.key] - logarithms[n.against.key]) for n in source.neighbours
@@ -535,8 +560,9 @@ def _budget(
             "open": "; ".join(name for name, source in sources.items() if source.is_open),
         },
     )
-    for name, side in (("lower", -1), ("upper", 1)):
-        bound = np.where(value == 0, math.nan, value) * np.exp(side * together(table, side))
+    size = np.where(value == 0, math.nan, value)
+    bounds = [size * np.exp(side * together(table, side)) for side in (-1, 1)]
+    for name, bound in (("lower", np.minimum(*bounds)), ("upper", np.maximum(*bounds))):
         table[name] = (axis, bound, {"units": units})
     return table
 
@@ -552,13 +578,15 @@ def together(table: xr.Dataset, side: int) -> Array:
 # budget
 
 
-@quantities(modulus_error="1", time_scale_error="1", cutoff="m")
+@quantities(modulus_error="1", time_scale_error="1", work_error="1", range_error="1", cutoff="m")
 def budget(
     case: Case | str | Path,
     quantity: str | Sequence[str] = "contact_area",
     *,
     modulus_error: Quantity | None = None,
     time_scale_error: Quantity | None = None,
+    work_error: Quantity | None = None,
+    range_error: Quantity | None = None,
     cutoff: Quantity | None = None,
     population: Population | None = None,
     out: str | Path | None = None,
@@ -579,6 +607,8 @@ def budget(
     modulus_error, time_scale_error : float or str, optional
         Relative errors of the moduli and the times of the material at 95 %, such as the error of a measured curve or
         the scatter between batches. Without an error its source stays open. [-]
+    work_error, range_error : float or str, optional
+        Relative errors of the work of adhesion and of its range at 95 %, likewise. [-]
     cutoff : float or str, optional
         Shortest wavelength of the real surface. Without it the waves that the scan does not resolve stay open. [m]
     population : {"patch", "ensemble"}, optional
@@ -610,7 +640,8 @@ def budget(
     -----
     Sources are taken as independent, in logarithms: :math:`Q e^{\pm U}`, :math:`U^2 = \sum U_i^2`. A source with a
     direction counts only on this side, and an open source does not count. A number that is zero, such as the leak rate
-    of a closed gap, has no logarithm, and its interval is missing.
+    of a closed gap, has no logarithm, and its interval is missing. A negative number, such as the force of a contact
+    under tension, has the logarithm of its size; its interval is missing if it changes sign in a neighbour.
 
     See Also
     --------
@@ -630,6 +661,8 @@ def budget(
     known = {
         "modulus_error": modulus_error,
         "time_scale_error": time_scale_error,
+        "work_error": work_error,
+        "range_error": range_error,
         "cutoff": cutoff,
         "population": population,
     }

@@ -48,6 +48,8 @@ _REMEDIES = {
     neighbours.SAMPLE: "a larger scan, or several of them",
     neighbours.OCTAVE: "a scan with finer cells",
     neighbours.MODULUS: "moduli that are known more accurately",
+    neighbours.WORK: "a work of adhesion that is known more accurately",
+    neighbours.RANGE: "a range of the attraction that is known more accurately",
     neighbours.TIME_SCALE: "times of the material, or its temperature, that are known more accurately",
 }
 
@@ -140,6 +142,8 @@ def choose(
     level = math.floor(math.log2(max(min(height.shape) / _FEWEST, 1.0))) - 2
     if neighbours.is_sample(case, height) and (wave := neighbours.shortest_wave(height)):
         level = min(level, math.floor(math.log2(wave / (2 * max(spacing(height))) * (1 + 1e-9))))
+    if case.settings.adhesion is not None:  # longer cells may not resolve the range of the attraction
+        level = 0
     level = coarsest = max(level, 0)
     while True:
         base = changed(base, {"solve.tolerance": float(f"{tolerance:.2g}")})
@@ -147,7 +151,8 @@ def choose(
         sources = neighbours.sources_of(base, height, want, 2.0**level, 2.0**coarsest)
         [own] = neighbours.solve([chosen], folder / neighbours.FOLDER, **computing).values()
         own = own if places is None else neighbours.at_rows(own, axis, places)
-        own = own.isel({axis: np.flatnonzero(own["force"] > 0)})
+        loaded = own["force"] > 0 if case.settings.adhesion is None else own["contact_area"] > 0
+        own = own.isel({axis: np.flatnonzero(loaded)})
         budgets = neighbours.compared(chosen, sources, observed, folder / neighbours.FOLDER, own, **computing)
         cells = "{} x {} cells".format(*neighbours.shape_on(case, height, 2.0**level))
         reached = [

@@ -19,9 +19,15 @@ from roughvisc.mechanics.scene import Array, Point, Scene
 from roughvisc.units import format_quantity
 
 #: Largest change of the approach of an elastic body in a step, in ranges, and part of a segment of loads in a step.
-PATH, PART_OF_LOAD = 0.5, 0.02
+PATH = 0.5
+PART_OF_LOAD = 0.02
 #: Length of the step of a jump, as a part of a usual step.
 JUMP = 1 / 512
+#: Growth of the steps of an elastic body after a step without a refusal, and after a jump.
+GROWTH = 4.0
+#: Tolerance of the contact solver over the one of other contacts. At 1, the noise of the solver doubles the number of
+#: time steps of a viscoelastic body.
+SHARPER = 0.5
 #: Work of a step that no energy stores, over its size, from which the step contains a jump.
 MISSED = 0.25
 #: Number of loads that are tried for the largest tension of a contact.
@@ -40,6 +46,7 @@ def step_with_adhesion(
     tolerance: float,
     *,
     by_load: bool,
+    may_refuse: bool = False,
 ) -> Point:
     """Return the point a step ahead: the state into which the present gap relaxes.
 
@@ -63,15 +70,21 @@ def step_with_adhesion(
         Tolerance of the contact solver.
     by_load : bool
         Whether the load is given.
+    may_refuse : bool
+        Whether to refuse a step in which the contact may jump.
 
     Raises
     ------
     InputError
         If the contact does not carry a negative load.
+    Unstable
+        If `may_refuse`, and the contact may jump.
     ConvergenceError
         If the contact solver does not converge.
     """
-    grid, adhesion, alpha = scene.grid, scene.adhesion, prediction.compliance
+    grid = scene.grid
+    adhesion = scene.adhesion
+    alpha = prediction.compliance
     assert adhesion is not None
     unit = grid.cell_area / alpha
 
@@ -83,11 +96,12 @@ def step_with_adhesion(
             adhesion.range,
             approach=here.approach if by_load else given,
             load=given / unit if by_load else None,
-            tolerance=tolerance,
+            tolerance=SHARPER * tolerance,
             start=alpha * guess,
             start_gap=here.gap,
             least_size=scene.least_force / unit,
             present=scene.present,
+            stops_if_unstable=may_refuse,
         )
 
     try:

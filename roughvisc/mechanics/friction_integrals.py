@@ -44,16 +44,22 @@ Array = NDArray[np.float64]
 
 # Frequencies per decade at which the means over the directions are tabulated, decades by which a table grows, and
 # points of the mean. Between the frequencies cubic splines of the logarithms have a relative error of 1e-6.
-_PER_DECADE, _GROWS, _DIRECTIONS = 24, 3.0, 64
+_PER_DECADE = 24
+_GROWS = 3.0
+_DIRECTIONS = 64
 # Logarithm of a loss modulus that counts as zero. [Pa]
 _NO_LOSS = -600.0
 # Logarithms of G between which the integral of P^3 is tabulated, and their step.
 _LOGARITHMS = np.arange(-10.0, 60.0, 0.05)
 # Largest relative change of the rises of temperature when they agree with the heat; iterations with each damping, and
 # remembered. On 480 random rubbers, roads and speeds all but one were solved, nearly all with the first damping.
-_CONVERGED, _ITERATIONS, _REMEMBERED, _DAMPINGS = 1e-9, 60, 6, (1.0, 0.3)
+_CONVERGED = 1e-9
+_ITERATIONS = 60
+_REMEMBERED = 6
+_DAMPINGS = (1.0, 0.3)
 # Least rise at the start over the rise by the friction without heat, and largest step of a logarithm.
-_LEAST_START, _LARGEST_STEP = 1e-6, 2.0
+_LEAST_START = 1e-6
+_LARGEST_STEP = 2.0
 
 
 class DirectionMeans:
@@ -85,7 +91,8 @@ class DirectionMeans:
             Wave number times speed times shift factor, positive. [rad/s]
         """
         logarithm = np.log(frequency)
-        low, high = float(logarithm.min()), float(logarithm.max())
+        low = float(logarithm.min())
+        high = float(logarithm.max())
         if low < self._range[0] or high > self._range[1]:
             self._tabulate(low, high)
         square, loss = (spline(logarithm) for spline in self._splines)
@@ -96,7 +103,8 @@ class DirectionMeans:
         if self._range[0] < math.inf:
             low = self._range[0] if low >= self._range[0] else low - _GROWS
             high = self._range[1] if high <= self._range[1] else high + _GROWS
-            low, high = min(low, self._range[0]), max(high, self._range[1])
+            low = min(low, self._range[0])
+            high = max(high, self._range[1])
         count = 8 + int((high - low) / math.log(10) * _PER_DECADE)
         grid = np.linspace(low, max(high, low + 1e-6), count)
         modulus = 1 / complex_compliance(self._material, np.exp(grid)[:, None] * self._cosines)
@@ -209,7 +217,8 @@ class FrictionIntegrals:
         if self._heating is None:
             friction, contact = self._friction(speed, np.ones(self._q.size))
             return SlidingWaves(friction, contact, cold, float(friction.sum()) * self._pressure * speed)
-        heating, radius = self._heating, float(self._heating.spot_radius or math.inf)
+        heating = self._heating
+        radius = float(self._heating.spot_radius or math.inf)
         spot = MovingSpot(radius, speed, heating.heat_conductivity, heating.volumetric_heat_capacity, self._q)
 
         def hotter(rise: Array) -> tuple[Array, SlidingWaves]:

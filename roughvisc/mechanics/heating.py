@@ -38,12 +38,16 @@ from roughvisc.units import Quantity, number, quantities
 Array = NDArray[np.float64]
 
 # Argument of the Bessel function above which its square counts as its mean 1 / (pi x), and ends of the range.
-_OSCILLATES, _LEAST, _MOST = 60.0, 1e-9, 1e12
+_OSCILLATES = 60.0
+_LEAST = 1e-9
+_MOST = 1e12
 # Points per panel of this integral, and panels per decade where nothing oscillates.
-_POINTS, _PER_DECADE = 4, 1.5
+_POINTS = 4
+_PER_DECADE = 1.5
 # Step of the logarithm of k, and margin of k beyond the wave numbers of source, depth and spot. The integrand is
 # analytic in a strip of half-width pi / 4, so that the trapezoidal rule has an error of exp(-pi^2 / 2 / step).
-_STEP, _MARGIN = 0.25, 1e7
+_STEP = 0.25
+_MARGIN = 1e7
 # Spacing of the temperatures at which the shift factor is evaluated. Between them its logarithm is linear. [K]
 _BETWEEN = 0.25
 
@@ -185,7 +189,8 @@ class MovingSpot:
         diffusivity = conductivity / capacity
         layer = math.sqrt(speed / (radius * diffusivity))  # inverse depth to which heat flows under a fast spot
         scales = [1 / radius, layer, *wave_numbers[np.isfinite(wave_numbers)].tolist()]
-        low, high = math.log(min(scales) / _MARGIN), math.log(max(scales) * _MARGIN)
+        low = math.log(min(scales) / _MARGIN)
+        high = math.log(max(scales) * _MARGIN)
         k = np.exp(np.linspace(low, high, 2 + int((high - low) / _STEP)))
         x, share = _disc()
         flow = np.square(diffusivity * (k[:, None] ** 2 + (x / radius) ** 2)) + np.square(x * (speed / radius))

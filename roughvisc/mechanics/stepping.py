@@ -23,7 +23,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from roughvisc.errors import ConvergenceError, InputError
-from roughvisc.mechanics.adhesive_step import JUMP, dissipated, longest_step, step_with_adhesion
+from roughvisc.mechanics.adhesive_step import GROWTH, JUMP, dissipated, longest_step, step_with_adhesion
+from roughvisc.mechanics.contact.adhesive import Unstable
 from roughvisc.mechanics.contact.solver import solve_contact
 from roughvisc.mechanics.memory import STIFF, Rule
 from roughvisc.mechanics.program import Segment, Slide, instant
@@ -278,12 +279,12 @@ def without_past(point: Point) -> Point:
     return replace(point, previous=None, history=replace(point.history, earlier=None, step=0.0))
 
 
-def single_step(scene: Scene, state: State, time: float) -> Step:
+def single_step(scene: Scene, state: State, time: float, *, may_refuse: bool = False) -> Step:
     """Return one step that both solutions take: a jump, or a step without contact or without memory."""
     fine = state.fine
     coarse = state.twice or state.fine
     number = state.segment
-    new = other = take_step(scene, fine, time, number, rule="linear")
+    new = other = take_step(scene, fine, time, number, rule="linear", may_refuse=may_refuse)
     if coarse is not fine:
         rule: Rule | None = "linear" if coarse.is_open else None
         other = take_step(scene, coarse, time, number, guess=with_difference(new, coarse, fine), rule=rule)
@@ -325,18 +326,25 @@ def step_on_path(scene: Scene, state: State, segment: Segment, event: float) -> 
     """Return a step of an elastic body with adhesion to an event at most [s]; the step of a jump is short."""
     fine = state.fine
     is_refused = False
-    longest = min(longest_step(scene, segment, fine.start), event - fine.time)
+    longest = longest_step(scene, segment, fine.start)
     length = min(state.next_length or longest, longest)
+    shortest = JUMP * longest * (1 + ROUNDED)
     while True:
         parts = max(math.ceil((event - fine.time) / length * (1 - ROUNDED)), 1)
-        step = single_step(scene, state, fine.time + (event - fine.time) / parts if parts > 1 else event)
-        taken = step.point.time - fine.time
+        time = fine.time + (event - fine.time) / parts if parts > 1 else event
+        try:
+            step = single_step(scene, state, time, may_refuse=time - fine.time > shortest)
+        except Unstable:
+            length = (time - fine.time) / 2
+            is_refused = True
+            continue
+        taken = time - fine.time
         lost = dissipated(scene, fine, step.point)
-        if lost == 0 or taken <= JUMP * longest * (1 + ROUNDED):
+        if lost == 0 or taken <= shortest:
             break
         length = taken / 2
         is_refused = True
-    following = 0.0 if lost > 0 else taken / 2 if is_refused else 2 * taken
+    following = taken / 2 if is_refused and lost == 0 else GROWTH * taken
     total = state.dissipated + lost
     after = replace(step.state, dissipated=total, next_length=0.0 if step.state.segment > state.segment else following)
     return step._replace(state=after)
@@ -658,6 +666,8 @@ def take_step(
     guess: Guess | None = None,
     rule: Rule | None = None,
     solver_part: float = SOLVER_PART,
+    *,
+    may_refuse: bool = False,
 ) -> Point:
     """Return the point a step ahead.
 
@@ -679,9 +689,13 @@ def take_step(
         Rule of the memory.
     solver_part : float
         Tolerance of the contact solver over the tolerance of the run.
+    may_refuse : bool
+        With adhesion, whether to refuse a step in which an elastic contact may jump.
 
     Raises
     ------
+    Unstable
+        If `may_refuse`, and the contact may jump.
     ConvergenceError
         If the contact solver does not converge.
     """
@@ -713,7 +727,17 @@ def take_step(
     tolerance = max(solver_part * scene.tolerance, 1e-10)
     if scene.adhesion is not None:
         return step_with_adhesion(
-            scene, here, time, value, prediction, gap, pressure, previous, tolerance, by_load=by_load
+            scene,
+            here,
+            time,
+            value,
+            prediction,
+            gap,
+            pressure,
+            previous,
+            tolerance,
+            by_load=by_load,
+            may_refuse=may_refuse,
         )
     start = dict[str, Any]()
     if guess or not here.is_open:  # otherwise the first guess would be zero

@@ -9,6 +9,7 @@ from roughvisc.plot.fields import animate, maps, section, surface
 from roughvisc.plot.master import master_curve
 from roughvisc.plot.result_page import page
 from roughvisc.plot.sweep import sweep
+from roughvisc.plot.waves import waves
 
 __all__ = [
     "animate",
@@ -23,6 +24,7 @@ __all__ = [
     "surface",
     "sweep",
     "trade",
+    "waves",
 ]
 
 

@@ -119,6 +119,21 @@ def test_elastic_body__follows_its_branch_and_states_what_its_jumps_dissipate():
     assert float(found.work_of_separation[0]) > lost.max()
 
 
+@pytest.mark.parametrize("boundary", ["free", "periodic"])
+def test_convolutions__are_less_than_three_times_those_without_adhesion(boundary):
+    side = 0.4 * RANGE**2 * MODULUS / WORK
+    rough = rv.self_affine(24 * side, 24, hurst=0.8, rms_height=RANGE, rolloff=12 * side, shortcut=4 * side, seed=1)
+    surface = ball() if boundary == "free" else rough
+    options = {"boundary": boundary, "times": 17, "tolerance": 1e-3, "edge": "accept"}
+    program = rv.Program().approach(2 * RANGE, over=1).approach(RANGE, over=1)
+    zener = rv.zener(MODULUS / 2, MODULUS / 2, MODULUS / 2)
+    needed = [
+        int(rv.observables.history(press(surface, program, zener, adhesion, **options)).convolutions.sum())
+        for adhesion in (STICKY, None)
+    ]
+    assert needed[0] < 3 * needed[1]
+
+
 def test_load_below_the_pull_off__is_refused_with_the_largest_tension():
     largest = 1.66 * math.pi * WORK * RADIUS  # at Tabor 1
     program = rv.Program().load(0, over=0).load(-2 * largest, over=1)

@@ -69,6 +69,26 @@ def test_modulus__of_a_hertz_contact(tmp_path, quantity, power):
     assert width(found, "modulus") == pytest.approx(power * np.log(1.05), rel=0.1, abs=1e-9)
 
 
+def test_sticky_ball__has_the_errors_of_work_and_range_and_signed_bounds(tmp_path):
+    """Of stiff surfaces apart the tension is ``2 pi R w exp(approach / range)``; the wider grid is not refused."""
+    gap, reach = 1e-7, 1e-7
+    tables = BALL | {
+        "surface": {"generate": "sphere", "radius": 1e-5, "size": 1.2e-5, "shape": [24, 24]},
+        "material": {"model": "elastic", "shear_modulus": 1e9},
+        "adhesion": {"work": 1e-3, "range": reach},
+        "program": [{"approach": -gap, "over": 0}],
+        "solve": {"boundary": "free", "tolerance": 1e-3, "edge": "accept"},
+        "keep": {"times": [0.0], "fields": []},
+    }
+    found = stated(case(tables, tmp_path), tmp_path, "force", modulus_error=0.05, work_error=0.2, range_error=0.1)
+    exact = -2 * np.pi * 1e-5 * 1e-3 * np.exp(-gap / reach)
+    assert float(found["lower"][0]) < exact < float(found["upper"][0]) < 0
+    assert width(found, "work of adhesion") == pytest.approx(np.log(1.2), rel=1e-2)
+    assert width(found, "range of adhesion") == pytest.approx(np.log(1.1) * gap / reach, rel=0.1)
+    assert width(found, "modulus") < 1e-3
+    assert "range of adhesion" not in stated(case(BALL, tmp_path), tmp_path)["source"]
+
+
 def test_time_scale__of_a_fluid_under_a_ball(tmp_path):
     """a^3 goes with J = 1/G + t/eta: its logarithm changes with that of the times by -(t/eta) / J."""
     fluid = {"model": "maxwell", "shear_modulus": "1 MPa", "viscosity": "10 MPa s", "shift_factor": 0.1}

@@ -43,6 +43,8 @@ FEW = {"surface.shape": [16, 15], "surface.shortcut": 2e-4}
 RAMP = {"load": 0.02, "over": 0.01}
 CYCLE = {"program": [RAMP, {"cycle": {"mean": 0.02, "amplitude": 0.01, "period": 0.1, "cycles": 3}}]}
 SLIDE = {"program": [RAMP, {"slide": 2e-4, "over": 0.1, "direction": "x"}], "keep.times": 5}
+DECADES = [10.0**power for power in range(-7, 2)]
+FAST = {"model": "prony", "glassy": 1e-9, "compliances": [1e-9 * 2.5**i for i in range(9)], "times": DECADES}
 CASES = {
     "load": (ROUGH, {}),
     "slide": (ROUGH, SLIDE),
@@ -54,9 +56,10 @@ CASES = {
     "free": (ROUGH, {"solve.boundary": "free", "solve.edge": "accept"}),
     "approach": (ROUGH, {"program": [{"approach": 3e-6, "over": 0.1}, {"hold": 0.2}]}),
     "unloaded": (ROUGH, {"program": [RAMP, {"hold": 0.5}, {"load": 0.004, "over": 0.1}]}),
+    "fast": (SPHERE, {"material": FAST, "program": [{"load": 0.01, "over": 1}, {"hold": 5}], "solve.tolerance": 1e-3}),
     "elastic": (ROUGH, {"material": {"model": "elastic", "shear_modulus": 1e6}}),
 }
-QUICK = ("load", "slide", "fields", "curve", "fine", "growing", "part")
+QUICK = ("fast", "load", "slide", "fields", "curve", "fine", "growing", "part")
 
 
 @pytest.fixture

@@ -312,3 +312,13 @@ def test_master_curve__has_the_shifted_rows_on_the_line_of_the_material():
     assert np.ma.getdata(shifts.collections[-1].get_offsets())[:, 1] == pytest.approx([1, 0, -1], abs=0.02)
     with refused("material"):
         plot.master_curve(rv.elastic(1e6))
+
+
+def test_waves__add_up_to_the_friction_of_each_speed():
+    spectrum = rv.psd_table(np.geomspace(1e4, 1e7, 40), np.geomspace(1e-16, 1e-26, 40), convention="psd")
+    ds = rv.friction_theory(spectrum, rv.zener(1e6, 1e6, 1e3), speeds=[1e-3, 1e-2, 1e-1], pressure=1e5)
+    (axes,) = plot.waves(ds).axes
+    totals = [line.get_ydata().sum() for line in axes.lines]
+    assert totals == pytest.approx(ds.friction_coefficient.values, rel=1e-6)
+    with refused("dataset"):
+        plot.waves(ds.drop_vars("friction_of_waves"))

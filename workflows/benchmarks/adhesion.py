@@ -1,8 +1,9 @@
-"""Sticky contact against dense rings, Tamaas and sharper runs, and its cost.
+"""Sticky contact against dense rings, other programs and sharper runs, and its cost.
 
-    python workflows/benchmarks/adhesion.py [balls] [speeds] [tamaas] [scenes] [cost] [--count 100] [--seed 1]
+    python workflows/benchmarks/adhesion.py [PART ...] [--count 100] [--seed 1]
 
-Each part prints one table. `tamaas` needs Tamaas.
+Each part prints one table: balls, speeds, tamaas, contact_mechanics, scenes, cost. `tamaas` needs Tamaas, and
+`contact_mechanics` needs the packages ContactMechanics and Adhesion.
 """
 
 import argparse
@@ -181,6 +182,43 @@ def tamaas(count=64, approaches=9, seed=5):
         }
 
 
+def contact_mechanics(ratio=0.4):
+    """Pressed ball in free space at Tabor 1: differences to ContactMechanics, which minimises the same energy."""
+    try:
+        from Adhesion.Interactions import Exponential
+        from Adhesion.System import BoundedSmoothContactSystem
+        from ContactMechanics import FreeFFTElasticHalfSpace
+        from SurfaceTopography import Topography
+    except ImportError:
+        return
+    sticky = attraction(1.0)
+    surface, depth = ball(sticky, ratio, 2.5), scales(sticky)[1]
+    ds = run(
+        surface, ELASTIC, rv.Program().approach(depth, over=1), sticky, times=[1], tolerance=1e-6,
+        fields=("pressure", "gap"),
+    )  # fmt: skip
+    own, gap = ds.pressure.values[0] / sticky.strength, ds.gap.values[0] / RANGE
+    shape, size = surface.shape, surface.shape[0] * cell(sticky, ratio) / RANGE  # lengths in ranges
+    body = FreeFFTElasticHalfSpace(shape, young=MODULUS / sticky.strength, physical_sizes=(size, size))
+    heights = surface.values / RANGE
+    system = BoundedSmoothContactSystem(body, Exponential(1.0, 1.0), Topography(heights, (size, size)))
+    start = np.zeros(body.nb_subdomain_grid_pts)
+    cells = slice(shape[0]), slice(shape[1])
+    start[cells] = np.maximum(heights + depth / RANGE, 0)
+    system.minimize_proxy(
+        offset=depth / RANGE, initial_displacements=start, method="L-BFGS-B", lbounds="auto",
+        options={"gtol": 1e-10, "ftol": 0, "maxcor": 50, "maxiter": 100_000, "maxfun": 1_000_000},
+    )  # fmt: skip
+    pressure = -system.substrate.force[cells] * shape[0] ** 2 / size**2
+    yield {
+        "cells": shape[0],
+        "contact": float((gap == 0).mean()),
+        "pressure": float(abs(own - pressure).sum() / abs(pressure).sum()),
+        "gap": float(abs(system.disp[cells] - heights - depth / RANGE - gap).max()),
+        "force": abs(float(own.sum() / pressure.sum()) - 1),
+    }
+
+
 def drawn(rng):
     """Random scene: surface, boundary, body, attraction and program."""
     sticky = attraction(rng.uniform(0.5, 1.7))
@@ -271,7 +309,14 @@ def costs(count=64, tolerance=1e-3):
             }
 
 
-PARTS = {"balls": balls, "speeds": speeds, "tamaas": tamaas, "scenes": scenes, "cost": costs}
+PARTS = {
+    "balls": balls,
+    "speeds": speeds,
+    "tamaas": tamaas,
+    "contact_mechanics": contact_mechanics,
+    "scenes": scenes,
+    "cost": costs,
+}
 
 
 def main(parts=tuple(PARTS), **options):

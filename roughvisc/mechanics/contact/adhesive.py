@@ -31,11 +31,17 @@ Array = Any  # an array of NumPy or CuPy
 #: Gap beyond which the tension counts as zero, in ranges.
 REACH = 36.0
 #: Largest change of a gap in one step, in ranges, in cells whose tension is at least this part of the largest one.
-LEAP, FELT = 1.0, 0.01
+LEAP = 1.0
+FELT = 0.01
+#: Largest change of a gap from the given state to the first guess, in ranges.
+GUESSED = 0.5
 #: Change of the step length from one iteration to the next: smallest, largest, and largest after a cut step.
-SHRINK, GROW, GROW_AFTER_CUT = 0.3, 3.0, 1.3
+SHRINK = 0.3
+GROW = 3.0
+GROW_AFTER_CUT = 1.3
 #: Longest step, in trials, and shortest one: a projected-gradient step replaces a shorter step.
-LONGEST, SHORTEST = 30.0, 1e-3
+LONGEST = 30.0
+SHORTEST = 1e-3
 #: Iterations in which the decrement must halve.
 PATIENCE = 30
 #: Safety factor of the estimated error.
@@ -48,6 +54,10 @@ ROUNDED = 1e-13
 
 class PulledOff(Exception):
     """The contact does not carry a negative load."""
+
+
+class Unstable(Exception):
+    """The energy has no minimum along a step: the given state may have been unstable."""
 
 
 class AdhesiveState(NamedTuple):
@@ -114,7 +124,9 @@ class Elastic:
     """
 
     def __init__(self, grid: Grid, work: float, reach: float, load: float | None, present: Array | None) -> None:
-        xp, self.grid, self.under_load = grid.xp, grid, load is not None
+        xp = grid.xp
+        self.grid = grid
+        self.under_load = load is not None
         self.cells = slice(0, grid.shape[0]), slice(0, grid.shape[1])
         self.is_cell = xp.zeros(grid.points, bool)
         self.is_cell[self.cells] = True if present is None else present
@@ -199,6 +211,7 @@ def solve_adhesive(
     start_gap: Array | None = None,
     least_size: float = 0.0,
     present: Array | None = None,
+    stops_if_unstable: bool = False,
     max_iterations: int = 5_000,
 ) -> AdhesiveState:
     """Return the contact state into which a given state relaxes under a given load or approach.
@@ -222,11 +235,14 @@ def solve_adhesive(
     start : array, shape (nx, ny), optional
         Pressure of the first guess. Default: the undeformed surface. [-]
     start_gap : array, shape (nx, ny), optional
-        Gap of the given state. Default: follows from pressure and approach. [m]
+        Gap of the given state. The first guess changes no gap by more than half the range. Default: follows from
+        pressure and approach. [m]
     least_size : float
         The error is relative to the integral of the absolute pressure, but at least to this value. [-]
     present : array of bool, shape (nx, ny), optional
         Cells with material. Default: all.
+    stops_if_unstable : bool
+        Whether to raise `Unstable` as soon as the energy has no minimum along a step.
     max_iterations : int
         Largest number of steps.
 
@@ -234,14 +250,24 @@ def solve_adhesive(
     ------
     PulledOff
         If the contact does not carry a negative load.
+    Unstable
+        If `stops_if_unstable`, and the given state may have been unstable.
     ConvergenceError
         If the tolerance is not reached.
     """
-    body, peak = Elastic(grid, work, reach, load, present), work / reach
+    body = Elastic(grid, work, reach, load, present)
+    peak = work / reach
     heights, gap, level = first_guess(body, given / reach, approach / reach, start, start_gap, peak, reach)
     pressure = body.pressure(gap - heights, level)
-    length, error, is_unstable, stalled, lowest = 1.0, math.inf, False, 0, math.inf
-    requested, last_decrement, last, steepest = math.nan, math.nan, None, float(body.stiffness.max())
+    length = 1.0
+    error = math.inf
+    is_unstable = False
+    stalled = 0
+    lowest = math.inf
+    requested = math.nan
+    last_decrement = math.nan
+    last = None
+    steepest = float(body.stiffness.max())
     for iteration in range(max_iterations + 1):
         state = balance(body, gap, pressure)
         pulls = load is not None and load < 0 and bool(state.is_open.all())
@@ -261,25 +287,32 @@ def solve_adhesive(
         lowest, stalled = (decrement, 0) if decrement < lowest / 2 else (lowest, stalled + 1)
 
         direction = conjugate(body, step, state, last)
-        change, slope = None, 0.0
+        change = None
+        slope = 0.0
         if stalled <= PATIENCE:
             change, slope, length = trial(body, gap, step, direction, state, length)
         if change is None:  # a projected-gradient step always descends
             total_gap = float(gap.sum()) if body.keeps_mean else None
             change = body.cut(gap - state.residual * state.free / steepest, total_gap) - gap
-            length, lowest, stalled = 1.0, decrement, 0
+            length = 1.0
+            lowest = decrement
+            stalled = 0
             slope = inner(change, state.residual)
             if not slope < 0:
                 break  # the minimum, to rounding
-        response, bend = body.response(change), state.tension * change
+        response = body.response(change)
+        bend = state.tension * change
         elastic = inner(change, response)
         curvature = elastic - inner(bend, change)
         best = min(-slope / curvature, LONGEST) if curvature > 0 else LONGEST
         is_unstable |= curvature <= 0
+        if is_unstable and stops_if_unstable:
+            raise Unstable
         fraction, was_cut = part_of_trial(body, gap, change, state, best)
         gap, fraction = descend(body, gap, change, state, fraction, slope - inner(state.tension, change), elastic)
         pressure += fraction * response
-        requested, last_decrement = float(abs(response).sum()) / length, max(decrement, 1e-300)
+        requested = float(abs(response).sum()) / length
+        last_decrement = max(decrement, 1e-300)
         last = Previous(change, response - bend, curvature) if curvature > 0 else None
         length *= min(max(best, SHRINK), GROW_AFTER_CUT if was_cut else GROW)
 
@@ -288,7 +321,8 @@ def solve_adhesive(
     displaced = gap - heights
     if body.under_load:
         level = body.uniform * body.mean_response - float(displaced.mean())
-    cells, xp = body.cells, grid.xp
+    cells = body.cells
+    xp = grid.xp
     net = xp.where(state.is_open, -state.tension, pressure - state.mean)[cells] * peak
     apart = xp.where(body.is_cell, gap, math.inf)[cells] * reach
     displacement = (displaced + level)[cells] * reach
@@ -305,7 +339,8 @@ def first_guess(
     reach: float,
 ) -> tuple[Array, Array, float]:
     """Return the heights of the gap without displacement, the gap of the given state, and the approach."""
-    grid, cells = body.grid, body.cells
+    grid = body.grid
+    cells = body.cells
     xp = grid.xp
     heights = xp.zeros(grid.points)
     heights[cells] = given
@@ -317,7 +352,14 @@ def first_guess(
         displaced += grid.filtered(pushed, body.symbol)
     gap = heights + displaced
     if start_gap is not None:
-        gap[cells] = xp.where(body.is_cell[cells], start_gap / reach, displaced[cells])
+        before = xp.where(body.is_cell[cells], start_gap / reach, displaced[cells])
+        guessed = gap[cells]
+        touches = before == 0
+        if body.under_load and touches.any():  # the approach is unknown: contact cells remain in contact
+            guessed = guessed - float(guessed[touches].mean())
+        moved = before + xp.clip(guessed - before, -GUESSED, GUESSED)
+        remains = touches & (pushed[cells] > -1)
+        gap[cells] = xp.where(body.is_cell[cells], xp.where(remains, 0.0, moved), before)
     total = float(heights.sum()) - level * heights.size if body.keeps_mean else None
     return heights, body.cut(gap, total), level
 
@@ -352,7 +394,8 @@ def trial(
         slope = inner(change, state.residual)
         if slope < 0:
             return change, slope, length
-        length, direction = length / 4, step
+        length = length / 4
+        direction = step
     return None, 0.0, length
 
 
@@ -387,7 +430,8 @@ def descend(
     linear, elastic : float
         Derivative of the energy without attraction along the trial, and its second derivative.
     """
-    xp, before = body.grid.xp, float(state.tension.sum())
+    xp = body.grid.xp
+    before = float(state.tension.sum())
     while True:
         moved = gap + fraction * change
         moved = xp.where(body.is_cell, xp.maximum(moved, 0), moved)

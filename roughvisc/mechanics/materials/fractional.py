@@ -15,7 +15,8 @@ Array = NDArray[np.float64]
 #: Smallest exponent; the number of points of the quadrature is inverse to it.
 _LEAST = 0.05
 #: Ends of the quadrature, and its step over the exponent: relative error 1e-14 (measured).
-_END, _STEP = 40.0, 0.25
+_END = 40.0
+_STEP = 0.25
 
 
 @quantities(instantaneous="Pa > 0", equilibrium="Pa > 0", relaxation_time="s > 0", exponent="1 > 0")
@@ -95,7 +96,8 @@ def fractional_creep(
     """
     step = _STEP * exponent
     w = np.arange(-_END, _END + step / 2, step)
-    p, rest = 1 / (1 + np.exp(-w)), 1 / (1 + np.exp(w))
+    p = 1 / (1 + np.exp(-w))
+    rest = 1 / (1 + np.exp(w))
     weights = step * p * rest
     angle = exponent * np.pi
     ratio = np.log(np.sin(angle * p)) - np.log(np.sin(angle * rest)) - np.log(instantaneous / equilibrium)

@@ -26,15 +26,19 @@ Array = NDArray[np.float64]
 #: five times the scatter, and bands of 90 % covered half.
 _PER_DECADE = 12
 #: Shortest relaxation time over the median step, and longest over the length of the record.
-_SHORTEST, _LONGEST = 2.0, 3.0
+_SHORTEST = 2.0
+_LONGEST = 3.0
 #: Steps from the contact to the first time of the bands, and number of times.
-_FIRST, _COUNT = 5.0, 30
+_FIRST = 5.0
+_COUNT = 30
 #: Rise of the squared misfit, over the variance, at the end of an interval of 90 %: the quantile of chi-squared.
 _RISE = 2.706
 #: Least noise of a force, over the largest force.
 _LEAST_NOISE = 1e-6
 #: Trial contact points, steps of bisection, and weight of a prescribed value, over the norm of the forces.
-_TRIALS, _BISECTIONS, _PRESCRIBED = 25, 9, 1e3
+_TRIALS = 25
+_BISECTIONS = 9
+_PRESCRIBED = 1e3
 
 
 @dataclass(frozen=True)
@@ -136,8 +140,8 @@ def contact_point(record: Indentation, low: float, high: float) -> float:
     best = int(np.argmin([misfit(trial, terms[:: _PER_DECADE // 2]) for trial in trials]))
     bounds = trials[max(best - 1, 0)], trials[min(best + 1, _TRIALS - 1)]
     options = {"xatol": 1e-4 * (high - low)}
-    found = scipy.optimize.minimize_scalar(misfit, bounds=bounds, args=(terms,), method="bounded", options=options)
-    return float(found.x)
+    fit = scipy.optimize.minimize_scalar(misfit, bounds=bounds, args=(terms,), method="bounded", options=options)
+    return float(fit.x)
 
 
 @dataclass(frozen=True)
@@ -222,7 +226,8 @@ def _interval(rows: Array, target: Array, value: Array) -> tuple[float, float]:
     """Return the ends of the interval of ``value @ weights``, over non-negative weights; see :func:`bands`."""
     norms = np.linalg.norm(rows, axis=0)
     norms[norms == 0] = 1.0
-    rows, value = rows / norms, value / norms
+    rows = rows / norms
+    value = value / norms
     weights, misfit = scipy.optimize.nnls(rows, target, maxiter=50 * norms.size)
     best = float(value @ weights)
     strength = _PRESCRIBED * float(np.linalg.norm(target)) / best
@@ -234,9 +239,11 @@ def _interval(rows: Array, target: Array, value: Array) -> tuple[float, float]:
 
     ends = []
     for sign in (-1, 1):
-        inside, outside = 0.0, 0.005
+        inside = 0.0
+        outside = 0.005
         while outside < 10 and is_close(best * (1 + sign * outside)):
-            inside, outside = outside, 2 * outside
+            inside = outside
+            outside = 2 * outside
         for _ in range(_BISECTIONS):
             middle = (inside + outside) / 2
             inside, outside = (middle, outside) if is_close(best * (1 + sign * middle)) else (inside, middle)

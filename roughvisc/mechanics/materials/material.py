@@ -201,10 +201,10 @@ class Prony:
         ndarray
             ``s`` times the Laplace transform of ``J(t)``. [1/Pa]
         """
-        found = self.glassy + (self.fluidity / s if self.fluidity else 0 * s)
+        transform = self.glassy + (self.fluidity / s if self.fluidity else 0 * s)
         for compliance, time in zip(self.compliances, self.times, strict=True):
-            found = found + compliance / (1 + s * time)
-        return np.asarray(found)
+            transform = transform + compliance / (1 + s * time)
+        return np.asarray(transform)
 
     def at(self, temperature: Quantity) -> Material:
         """Return the material at another temperature [K], see :func:`at_temperature`."""
@@ -216,8 +216,8 @@ class Prony:
             self,
             glassy=self.glassy / modulus_factor,
             fluidity=self.fluidity / (time_factor * modulus_factor),
-            compliances=tuple(one / modulus_factor for one in self.compliances),
-            times=tuple(time_factor * one for one in self.times),
+            compliances=tuple(value / modulus_factor for value in self.compliances),
+            times=tuple(time_factor * value for value in self.times),
             longest=time_factor * self.longest,
             replaces=self.replaces and replace(self.replaces, shortest=time_factor * self.replaces.shortest),
             note="; ".join(filter(None, (self.note, note))),
@@ -303,8 +303,8 @@ class Creep:
 
     def creep_compliance(self, t: ArrayLike) -> Array:
         """Return the shear creep compliance ``J(t)`` [1/Pa] at some times. [s]"""
-        found = self.function(np.asarray(t, dtype=float) / self.time_factor, *self.parameters)
-        return np.asarray(found, dtype=float) / self.modulus_factor
+        compliance = self.function(np.asarray(t, dtype=float) / self.time_factor, *self.parameters)
+        return np.asarray(compliance, dtype=float) / self.modulus_factor
 
     def contact_compliance(self, t: ArrayLike) -> Array:
         """Return the contact compliance ``C(t) = (1 - nu) J(t) / 2``. [1/Pa]"""
@@ -375,7 +375,7 @@ class Creep:
         """Return the material with all times multiplied by one factor and all moduli by another."""
         note = "; ".join(filter(None, (self.note, note)))
         if self.function is pair_creep:
-            a, b = (one.scaled(time_factor, modulus_factor) for one in self.parameters)
+            a, b = (value.scaled(time_factor, modulus_factor) for value in self.parameters)
             return replace(pair(a, b), note=note)
         factors = time_factor * self.time_factor, modulus_factor * self.modulus_factor
         thermal = self.thermal and self.thermal.scaled(time_factor, modulus_factor)
@@ -409,7 +409,8 @@ class ThermalLaw:
 
     def at(self, temperature: float) -> Material:
         """Return the material at a temperature, with this law. [K]"""
-        factor, stiffer = self.shift(temperature), self.moduli(temperature) if self.moduli else 1.0
+        factor = self.shift(temperature)
+        stiffer = self.moduli(temperature) if self.moduli else 1.0
         if not 1 / LARGEST_SHIFT <= factor <= LARGEST_SHIFT:
             expected = f"a shift of times by a factor from {1 / LARGEST_SHIFT:g} to {LARGEST_SHIFT:g}, not {factor!r}"
             raise InputError(key="temperature", found=temperature, expected=expected)
@@ -431,14 +432,14 @@ class PairLaw:
 
     def at(self, temperature: float) -> Material:
         """Return the pair with both bodies at a temperature. [K]"""
-        elastic = [isinstance(one, Prony) and not one.fluidity and not one.times for one in (self.a, self.b)]
+        elastic = [isinstance(body, Prony) and not body.fluidity and not body.times for body in (self.a, self.b)]
         bodies = (self.a, self.b)
-        changed = [one if fixed else one.at(temperature) for one, fixed in zip(bodies, elastic, strict=True)]
+        changed = [body if fixed else body.at(temperature) for body, fixed in zip(bodies, elastic, strict=True)]
         return pair(*changed)
 
     def scaled(self, time_factor: float, modulus_factor: float) -> PairLaw:
         """Return the law of the pair with all times multiplied by one factor and all moduli by another."""
-        return PairLaw(*(one.scaled(time_factor, modulus_factor) for one in (self.a, self.b)))
+        return PairLaw(*(value.scaled(time_factor, modulus_factor) for value in (self.a, self.b)))
 
 
 def creep(
@@ -587,7 +588,8 @@ def pair(a: Material, b: Material) -> Material:
         about["thermal"] = PairLaw(a, b)
     if not (isinstance(a, Prony) and isinstance(b, Prony)):
         return Creep(pair_creep, bodies, **about)
-    glassy, fluidity = 0.0, 0.0
+    glassy = 0.0
+    fluidity = 0.0
     compliances: dict[float, float] = {}
     for body in (a, b):
         share = 2 * (1 - body.poisson)  # J = 4 C, with C = (1 - nu) J / 2 of the body

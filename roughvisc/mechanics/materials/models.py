@@ -27,7 +27,8 @@ _ONE = 1e-9
 #: Sum of the moduli over the equilibrium modulus below which moduli of at most one are dimensionless ratios.
 _RATIOS = 1e-3
 #: Largest ratio of the distances of a zero from the poles next to it, and number of bisections.
-_LARGEST_RATIO, _BISECTIONS = 1e250, 70
+_LARGEST_RATIO = 1e250
+_BISECTIONS = 70
 
 
 def tensile_to_shear(kind: Kind, poisson: float) -> float:
@@ -328,7 +329,7 @@ def from_relaxation(
     constant = 0.5 if poisson is None else poisson
     factor = tensile_to_shear(kind, constant)
     if bulk_modulus is None:
-        return relaxation_series(plateau / factor, [one / factor for one in moduli], times, constant)
+        return relaxation_series(plateau / factor, [modulus / factor for modulus in moduli], times, constant)
     if not len(bulk_ratios) and not len(bulk_times):
         return _with_bulk(plateau, moduli, times, bulk_modulus, kind)
     if kind == "tensile":
@@ -352,8 +353,8 @@ def _from_ratios(
             raise InputError(
                 key=name, found=ratios, expected="a sum below 1 and a positive equilibrium, or instantaneous"
             )
-        return equilibrium, [equilibrium / rest * one for one in ratios]
-    return instantaneous * rest, [instantaneous * one for one in ratios]
+        return equilibrium, [equilibrium / rest * ratio for ratio in ratios]
+    return instantaneous * rest, [instantaneous * ratio for ratio in ratios]
 
 
 def _with_bulk(
@@ -374,24 +375,27 @@ def _with_bulk(
     second term is the creep compliance of the relaxation modulus ``3K + G(t)``, which vanishes for an incompressible
     material; the last is a sum of exponentials with the relaxation times. The bulk modulus is elastic, or a series.
     """
-    found = relaxation_series(equilibrium, moduli, times)
+    shear_series = relaxation_series(equilibrium, moduli, times)
     if kind == "tensile":
-        part = (equilibrium + sum(moduli)) / (9 * bulk_modulus)
-        if part >= 1:
-            expected = f"more than a ninth of the instantaneous Young's modulus, {1 / found.glassy:g} Pa"
+        bulk_share = (equilibrium + sum(moduli)) / (9 * bulk_modulus)
+        if bulk_share >= 1:
+            expected = f"more than a ninth of the instantaneous Young's modulus, {1 / shear_series.glassy:g} Pa"
             raise InputError(key="bulk_modulus", found=bulk_modulus, expected=expected)
-        found = found.scaled(1.0, 1 / 3)
-        glassy, later = found.glassy * (1 - part) * (1 + 3 * part), [one / (9 * bulk_modulus**2) for one in moduli]
+        shear_series = shear_series.scaled(1.0, 1 / 3)
+        glassy = shear_series.glassy * (1 - bulk_share) * (1 + 3 * bulk_share)
+        later = [modulus / (9 * bulk_modulus**2) for modulus in moduli]
     else:
-        terms_of_both = [*moduli, *(3 * one for one in bulk_moduli)]
+        terms_of_both = [*moduli, *(3 * modulus for modulus in bulk_moduli)]
         volume = relaxation_series(3 * bulk_modulus + equilibrium, terms_of_both, [*times, *bulk_times])
-        glassy, later, times = found.glassy + 3 * volume.glassy, [3 * one for one in volume.compliances], volume.times
-    terms = (*found.compliances, *later), (*found.times, *times)
+        glassy = shear_series.glassy + 3 * volume.glassy
+        later = [3 * modulus for modulus in volume.compliances]
+        times = volume.times
+    terms = (*shear_series.compliances, *later), (*shear_series.times, *times)
     elastic_or_not = "a relaxing" if len(bulk_moduli) else "an elastic"
     final = " in the end" if len(bulk_moduli) else ""
     note = f"effective compliance for {elastic_or_not} bulk modulus of {bulk_modulus:g} Pa{final}"
     stands_for = f"a body with {elastic_or_not} bulk modulus, whose Poisson ratio changes in time"
-    return Prony(glassy, found.fluidity, *terms, note=note, stands_for=stands_for)
+    return Prony(glassy, shear_series.fluidity, *terms, note=note, stands_for=stands_for)
 
 
 def relaxation_series(
@@ -414,7 +418,8 @@ def relaxation_series(
     if equilibrium:
         # dividing G~(s) = G_e + sum G_i s/(s + r_i) by s makes the equilibrium modulus a pole at zero like the others:
         # G~(-m)/(-m) = -G_e/m + sum G_i/(r_i - m), one zero between each two poles and none above the last
-        strengths, poles = np.append(equilibrium, strengths), np.append(0.0, poles)
+        strengths = np.append(equilibrium, strengths)
+        poles = np.append(0.0, poles)
     rates, offsets = _secular_roots(strengths, poles)
     # 1/G~ has the residue J_k rate there, and d(G~)/ds is rate * sum strengths / offset^2
     compliances = 1 / (rates * rates * np.sum(strengths / offsets**2, axis=1))
@@ -442,13 +447,17 @@ def _secular_roots(strengths: Array, poles: Array) -> tuple[Array, Array]:
     logarithmic scale, so that the offset of a zero close to a pole is accurate. The equivalent eigenproblem loses the
     slow modes over many decades of rates (24 decades: a negative eigenvalue).
     """
-    gaps, below, place = np.diff(poles), poles[:-1], np.arange(poles.size - 1)
-    low, high = np.full(gaps.size, 1 / _LARGEST_RATIO), np.full(gaps.size, _LARGEST_RATIO)
+    gaps = np.diff(poles)
+    below = poles[:-1]
+    place = np.arange(poles.size - 1)
+    low = np.full(gaps.size, 1 / _LARGEST_RATIO)
+    high = np.full(gaps.size, _LARGEST_RATIO)
     for _ in range(_BISECTIONS):
         ratio = np.sqrt(low) * np.sqrt(high)
         from_below = gaps / (1 + 1 / ratio)
         offsets = (poles - below[:, None]) - from_below[:, None]
         offsets[place, place + 1] = gaps / (1 + ratio)
         is_beyond = np.sum(strengths / offsets, axis=1) > 0  # the sum rises between two poles
-        low, high = np.where(is_beyond, low, ratio), np.where(is_beyond, ratio, high)
+        low = np.where(is_beyond, low, ratio)
+        high = np.where(is_beyond, ratio, high)
     return below + from_below, offsets

@@ -28,12 +28,15 @@ Array = NDArray[np.float64]
 #: Largest relative decrease of a creep function that counts as rounding.
 _ROUNDING = 1e-9
 #: Number of times per decade at which a series is fitted, and at which its error is measured.
-_FITTED, _MEASURED = 30, 100
+_FITTED = 30
+_MEASURED = 100
 #: Numbers of retardation times per decade to try in turn, and largest number of retardation times.
-_OFFERED, _MOST_OFFERED = (0.5, 0.7, 1, 1.5, 2, 3, 4, 6, 8, 12, 24, 48), 300
+_OFFERED = (0.5, 0.7, 1, 1.5, 2, 3, 4, 6, 8, 12, 24, 48)
+_MOST_OFFERED = 300
 #: Shortest time over the shortest retardation time, two values to try: the larger one gives a better fit before the
 #: shortest time, with more terms. Longest retardation time over the longest time.
-_FASTER, _SLOWER = (3.0, 10.0), 3.0
+_FASTER = (3.0, 10.0)
+_SLOWER = 3.0
 #: Retardation times of a solid that creeps on after the longest time, over its slowest other retardation time.
 _SLOW = 10.0 ** np.arange(1, 13)
 #: Fluidity of a material that creeps without end, if its series has none: without influence on oscillating waves.
@@ -73,9 +76,9 @@ def check_creep(material: Material, times: Array) -> Array:
         raise InputError(f"creep of {material!r} gives {values.shape} of {times.shape} times: expected a number each")
     falls = np.append(False, np.diff(values) < -_ROUNDING * values[1:])
     is_possible = np.isfinite(values) & (values >= 0) & ((values > 0) | (times == 0)) & ~falls
-    for at in np.flatnonzero(~is_possible)[:1]:
-        found = f"creep of {material!r} is {values[at]:g} 1/Pa at {times[at]:g} s"
-        raise InputError(f"{found}: expected a positive compliance (zero only at time zero), no less than before")
+    for row in np.flatnonzero(~is_possible)[:1]:
+        measured = f"creep of {material!r} is {values[row]:g} 1/Pa at {times[row]:g} s"
+        raise InputError(f"{measured}: expected a positive compliance (zero only at time zero), no less than before")
     return values[1:]
 
 
@@ -125,15 +128,16 @@ def series(
     instants = _instants(shortest, longest, _MEASURED)
     compliance = check_creep(material, instants)
     if until_end and material.is_solid:
-        instants, compliance = np.append(instants, math.inf), np.append(compliance, material.final_compliance)
+        instants = np.append(instants, math.inf)
+        compliance = np.append(compliance, material.final_compliance)
     if isinstance(material, Creep) and material.function is pair_creep:
         joined = cast(Prony, pair(*(series(one, shortest, longest, tolerance)[0] for one in material.parameters)))
         return joined, _error(joined, instants, compliance)
     fits = _fits(material, instants, compliance, tolerance)
-    error, found = min(fits, key=lambda one: (max(one[0], tolerance), len(one[1].times)))
-    if isinstance(material, Prony) and (error > tolerance or len(found.times) >= len(material.times)):
+    error, fitted = min(fits, key=lambda one: (max(one[0], tolerance), len(one[1].times)))
+    if isinstance(material, Prony) and (error > tolerance or len(fitted.times) >= len(material.times)):
         return replace(material, longest=math.inf), 0.0
-    return found, error
+    return fitted, error
 
 
 def _fits(material: Material, instants: Array, compliance: Array, tolerance: float) -> Iterator[tuple[float, Prony]]:
@@ -143,14 +147,18 @@ def _fits(material: Material, instants: Array, compliance: Array, tolerance: flo
     other instants then replace the fluidity.
     """
     is_bounded = math.isinf(instants[-1])
-    shortest, longest = instants[0], instants[-1 - is_bounded]
-    glassy, t = float(material.creep_compliance(0.0)), _instants(shortest, longest, _FITTED)
+    shortest = instants[0]
+    longest = instants[-1 - is_bounded]
+    glassy = float(material.creep_compliance(0.0))
+    t = _instants(shortest, longest, _FITTED)
     exact = material.creep_compliance(t)
     if is_bounded:
-        t, exact = np.append(t, math.inf), np.append(exact, compliance[-1])
+        t = np.append(t, math.inf)
+        exact = np.append(exact, compliance[-1])
     slow = longest * _SLOWER * _SLOW if is_bounded else np.zeros(0)
     for faster in _FASTER:
-        idle, reached = 0, math.inf
+        idle = 0
+        reached = math.inf
         for per_decade in _OFFERED:
             times = lattice(shortest / faster, longest * _SLOWER, per_decade)
             if idle == _IDLE or reached <= tolerance or times.size > _MOST_OFFERED:
@@ -158,14 +166,15 @@ def _fits(material: Material, instants: Array, compliance: Array, tolerance: flo
             times = np.append(times, slow)
             flowing = np.zeros_like(t) if is_bounded else t / longest
             columns = np.column_stack([flowing, -np.expm1(-t[:, None] / times)])
-            before, importance = reached, np.ones(t.size)
+            before = reached
+            importance = np.ones(t.size)
             for _ in range(_LEVELLINGS):
                 weights = nonnegative(columns, exact - glassy, exact / importance)
                 used = weights[1:] > 0
                 terms = tuple(weights[1:][used]), tuple(times[used])
-                found = Prony(glassy, float(weights[0] / longest), *terms, material.poisson)
-                error = _error(found, instants, compliance)
-                yield error, found
+                fit = Prony(glassy, float(weights[0] / longest), *terms, material.poisson)
+                error = _error(fit, instants, compliance)
+                yield error, fit
                 reached = min(reached, error)
                 misfit = np.abs((glassy + columns @ weights) / exact - 1)
                 importance = importance * np.sqrt(0.02 + misfit / max(float(misfit.max()), 1e-300))
@@ -205,10 +214,12 @@ def nonnegative(columns: Array, target: Array, scale: Array) -> Array:
     scaled = columns / scale[:, None]
     norms = np.sqrt(np.sum(scaled**2, axis=0))
     norms[norms == 0] = 1.0
-    matrix, wanted = scaled / norms, target / scale
+    matrix = scaled / norms
+    wanted = target / scale
     if wanted.size > _MANY:  # the triangular factor has the same squared misfit up to a constant
         factor: Array = np.asarray(np.linalg.qr(np.column_stack([matrix, wanted]), mode="r"))
-        matrix, wanted = factor[:, :-1], factor[:, -1]
+        matrix = factor[:, :-1]
+        wanted = factor[:, -1]
     weights, _ = scipy.optimize.nnls(matrix, wanted, maxiter=50 * columns.shape[1])
     seen = np.abs(scaled / norms).max(axis=0) * weights
     return np.where(seen > _UNSEEN, weights / norms, 0.0)
@@ -259,10 +270,10 @@ def complex_compliance(material: Material, frequency: ArrayLike) -> NDArray[np.c
     w = np.asarray(frequency, dtype=float)
     material = over_frequencies(material, w)
     if isinstance(material, Creep) and material.function is pair_creep:
-        return np.asarray(sum(complex_compliance(one, w) for one in material.parameters))
+        return np.asarray(sum(complex_compliance(law, w) for law in material.parameters))
     with np.errstate(divide="ignore", invalid="ignore"):  # at zero frequency
-        found = 0.5 * (1 - material.poisson) * material.laplace(1j * w)
-    return np.where(np.isfinite(found), found, complex(math.inf, 0.0))
+        compliance = 0.5 * (1 - material.poisson) * material.laplace(1j * w)
+    return np.where(np.isfinite(compliance), compliance, complex(math.inf, 0.0))
 
 
 def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float = 1e-4) -> Material:
@@ -284,13 +295,14 @@ def over_frequencies(material: Material, frequency: ArrayLike, tolerance: float 
         See :func:`complex_compliance`.
     """
     if isinstance(material, Creep) and material.function is pair_creep:
-        return pair(*(over_frequencies(one, frequency, tolerance) for one in material.parameters))
+        return pair(*(over_frequencies(law, frequency, tolerance) for law in material.parameters))
     if material.longest == math.inf if isinstance(material, Prony) else material.has_laplace:
         return material
     size = np.abs(np.asarray(frequency, dtype=float))
-    shortest, longest = 1 / (_BEYOND * float(size.max())), _BEYOND / float(size[size > 0].min())
+    shortest = 1 / (_BEYOND * float(size.max()))
+    longest = _BEYOND / float(size[size > 0].min())
     if isinstance(material, Creep):
-        found, _ = series(material, shortest, longest, tolerance, until_end=True)
-        return found if material.is_solid else replace(found, fluidity=found.fluidity or _FLOWS)
+        fitted, _ = series(material, shortest, longest, tolerance, until_end=True)
+        return fitted if material.is_solid else replace(fitted, fluidity=fitted.fluidity or _FLOWS)
     material.creep_compliance(longest)  # refuses a table that ends earlier
     return replace(material, longest=math.inf)

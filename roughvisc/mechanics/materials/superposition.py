@@ -8,6 +8,7 @@ References
 ----------
 .. [1] G. H. Golub and V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413-432; the Jacobian is that of L. Kaufman, BIT 15
    (1975) 49-57.
+.. [2] J. G. MacKinnon and H. White, J. Econometrics 29 (1985) 305-325, estimator HC3.
 """
 
 from __future__ import annotations
@@ -27,20 +28,27 @@ Array = NDArray[np.float64]
 #: Whether moduli change with temperature too: not, or in proportion to the absolute temperature.
 Vertical = Literal["none", "rubber"]
 #: Measured quantity of the rows.
-Quantity = Literal["storage", "loss", "relaxation", "creep"]
+Quantity = Literal["storage", "loss", "storage and loss", "relaxation", "creep"]
 
 #: Largest difference of neighbouring temperatures that count as one. [K]
 SAME_TEMPERATURE = 1.5
 #: Terms of the series per decade, and factor by which their times extend beyond those of the rows.
-_PER_DECADE, _BEYOND = 3.0, 3.0
+_PER_DECADE = 3.0
+_BEYOND = 3.0
 #: Error of a modulus relative to ``|G*|`` over its error relative to itself. A machine measures an angle, so that the
 #: loss of a stiff sample and the storage of a melt are uncertain.
 _OF_SIZE = 0.3
 #: Decades between neighbouring temperatures among which the first guess is sought, and their number per decade.
-_GUESSED, _GUESSES = (-6.0, 2.0), 20
+_GUESSED = (-6.0, 2.0)
+_GUESSES = 20
 #: Largest number of iterations, of dampings in one, largest change of ``ln a_T`` in one, and relative decrease of the
 #: squared misfit below which they end.
-_MOST, _DAMPINGS, _LARGEST_CHANGE, _DONE = 60, 8, 1.0, 1e-7
+_MOST = 60
+_DAMPINGS = 8
+_LARGEST_CHANGE = 1.0
+_DONE = 1e-7
+#: Least part of a row that its own fit leaves to its residual; a row that nothing else determines has none.
+_LEAST_SPARE = 1e-2
 #: Uncertainty of a decimal logarithm of a shift factor from which the material warns. For melts the shifts of storage
 #: and loss differ by 0.01, below the glass transition by 0.6 to 1.1.
 _UNCERTAIN = 0.3
@@ -58,7 +66,7 @@ class Superposition:
     log_shift : ndarray
         Decimal logarithms of the shift factors ``a_T``, relative to the reference.
     sigma : ndarray
-        Their standard deviations, from the scatter of the rows; NaN if the rows are too few to state it.
+        Their standard deviations, from the scatter of the rows [2]_; NaN if the rows are too few to state it.
     split : ndarray
         Half the differences of the shifts from storage and from loss; NaN for creep and relaxation.
     other : float
@@ -116,9 +124,11 @@ class Superposition:
     def reduced(self) -> tuple[Array, dict[str, Array]]:
         """Return frequency or time, and the values of the rows, at the reference temperature."""
         sign = -1.0 if {"creep", "relaxation"} & self.values.keys() else 1.0
-        at = self.at * 10 ** (sign * self.log_shift)[self.group]
+        reduced_at = self.at * 10 ** (sign * self.log_shift)[self.group]
         moduli = _moduli(self.temperatures, self.reference, self.vertical)[self.group]
-        return at, {name: row * moduli if name == "creep" else row / moduli for name, row in self.values.items()}
+        return reduced_at, {
+            name: row * moduli if name == "creep" else row / moduli for name, row in self.values.items()
+        }
 
     @property
     def scatter(self) -> float:
@@ -163,8 +173,10 @@ class Superposition:
         where = f"The shift factor at {self.temperatures[worst] - 273.15:.1f} degC is uncertain by"
         if split[worst] < uncertain[worst]:
             return f"{where} {uncertain[worst]:.2g} decades: the rows of neighbouring temperatures hardly overlap."
-        found = f"{where} {uncertain[worst]:.2g} decades, half the difference of the shifts from storage and from loss"
-        return f"{found}: the material is not thermorheologically simple there, or `vertical` is another."
+        uncertainty = (
+            f"{where} {uncertain[worst]:.2g} decades, half the difference of the shifts from storage and from loss"
+        )
+        return f"{uncertainty}: the material is not thermorheologically simple there, or `vertical` is another."
 
 
 def groups_of(temperatures: Array) -> tuple[Array, NDArray[np.intp]]:
@@ -200,9 +212,11 @@ def superpose(
 
     Notes
     -----
-    The shifts are those of the storage modulus, which a machine measures best. With :math:`x = \omega a_T \theta_i`,
+    Storage and loss have one series. The error of a row is relative to the modulus itself and to a part of ``|G*|``,
+    because a machine measures an angle. With :math:`x = \omega a_T \theta_i`,
 
     .. math:: G'(\omega, T) = b_T \Big[G_e + \sum_i G_i \frac{x^2}{1 + x^2}\Big], \quad
+              G''(\omega, T) = b_T \sum_i G_i \frac{x}{1 + x^2}, \quad
               G(t, T) = b_T \Big[G_e + \sum_i G_i e^{-t/(a_T \theta_i)}\Big], \quad
               J(t, T) = \frac{1}{b_T} \Big[J_0 + \frac{\varphi t}{a_T} + \sum_i J_i (1 - e^{-t/(a_T \tau_i)})\Big]
     """
@@ -210,18 +224,20 @@ def superpose(
     means, group = groups_of(temperatures)
     reference = means.size // 2
     size = np.hypot(*values.values()) if len(values) == 2 else np.zeros(at.size)
-    rows = {}
+    rows = []
     for name, value in values.items():
         scale = np.hypot(np.maximum(value, least), _OF_SIZE * size)
-        rows[name] = _Rows(name, at, group, value, scale, reference)
-    first, *others = rows.values()
+        rows.append(_Rows(name, at, group, value, scale, reference))
     moduli = _moduli(means, reference, known)
-    shifts, sigma, misfit = first.shifts(first.guess([*rows.values()]), moduli)
+    measured = rows[0]
+    shifts, sigma, misfit = measured.shifts(measured.guess(rows), moduli)
     split = np.full(means.size, np.nan)
-    for second in others:
-        split = np.abs(second.shifts(shifts, moduli)[0] - shifts) / 2
+    if len(rows) == 2:
+        split = np.abs(rows[1].shifts(shifts, moduli)[0] - shifts) / 2
+        measured = _Rows.both(*rows)
+        shifts, sigma, misfit = measured.shifts(shifts, moduli)
     (otherwise,) = set(get_args(Vertical)) - {known}
-    changed, _, _ = first.shifts(shifts, _moduli(means, reference, otherwise))
+    changed, _, _ = measured.shifts(shifts, _moduli(means, reference, otherwise))
     return Superposition(
         means,
         shifts / _DECADE,
@@ -254,10 +270,22 @@ class _Rows:
     scale: Array
     reference: int
 
+    @classmethod
+    def both(cls, storage: _Rows, loss: _Rows) -> _Rows:
+        """Return the rows of the storage modulus, and those of the loss modulus after them."""
+        return cls(
+            "storage and loss",
+            np.concatenate([storage.at, loss.at]),
+            np.concatenate([storage.group, loss.group]),
+            np.concatenate([storage.values, loss.values]),
+            np.concatenate([storage.scale, loss.scale]),
+            storage.reference,
+        )
+
     @property
     def sign(self) -> float:
         """Sign of ``ln a_T`` in the logarithm of the reduced frequency or time."""
-        return 1.0 if self.quantity in ("storage", "loss") else -1.0
+        return -1.0 if self.quantity in ("relaxation", "creep") else 1.0
 
     def guess(self, rows: list[_Rows]) -> Array:
         """Return a first guess of ``ln a_T``: a cubic through neighbouring temperatures fits best."""
@@ -265,16 +293,17 @@ class _Rows:
         shifts = np.zeros(count)
         offered = np.linspace(*_GUESSED, int(_GUESSES * (_GUESSED[1] - _GUESSED[0])) + 1) * _DECADE
         for number in range(count - 1):
-            first, second = self.group == number, self.group == number + 1
+            first = self.group == number
+            second = self.group == number + 1
             costs = []
             for shift in offered:
                 x = np.log(np.concatenate([self.at[first], self.at[second]]))
                 x[np.count_nonzero(first) :] += self.sign * shift
                 basis = np.linalg.qr(np.vander((x - x.mean()) / max(np.ptp(x), 1e-12), min(4, x.size)))[0]
                 cost = 0.0
-                for one in rows:
-                    y = np.concatenate([one.values[first], one.values[second]])
-                    y = np.log(np.maximum(y, 1e-3 * one.scale.min()))
+                for measured in rows:
+                    y = np.concatenate([measured.values[first], measured.values[second]])
+                    y = np.log(np.maximum(y, 1e-3 * measured.scale.min()))
                     cost += float(np.sum((y - basis @ (basis.T @ y)) ** 2))
                 costs.append(cost)
             shifts[number + 1] = shifts[number] + offered[int(np.argmin(costs))]
@@ -290,12 +319,14 @@ class _Rows:
         moduli : ndarray
             Factor of the moduli at each temperature.
         """
-        shifts, free = start, np.flatnonzero(np.arange(start.size) != self.reference)
+        shifts = start
+        free = np.flatnonzero(np.arange(start.size) != self.reference)
         damping = 1e-3
         fit = self._fit(shifts, moduli)
         for _ in range(_MOST):
             jacobian = fit.jacobian(self.group, free)
-            normal, gradient = jacobian.T @ jacobian, jacobian.T @ fit.residual
+            normal = jacobian.T @ jacobian
+            gradient = jacobian.T @ fit.residual
             scale = np.diag(np.diag(normal) + 1e-12 * np.trace(normal) + 1e-300)
             for _ in range(_DAMPINGS):
                 change = np.linalg.solve(normal + damping * scale, -gradient)
@@ -308,15 +339,13 @@ class _Rows:
             else:
                 break
             gain = fit.cost - better.cost
-            shifts, fit, damping = trial, better, max(damping / 10, 1e-9)
+            shifts = trial
+            fit = better
+            damping = max(damping / 10, 1e-9)
             if gain < _DONE * fit.cost:
                 break
-        jacobian = fit.jacobian(self.group, free)
-        spare = int(self.at.size - free.size - np.count_nonzero(fit.weights))
         sigma = np.zeros(start.size)
-        sigma[free] = (
-            np.nan if spare < 1 else np.sqrt(fit.cost / spare * np.diag(np.linalg.pinv(jacobian.T @ jacobian)))
-        )
+        sigma[free] = fit.deviations(fit.jacobian(self.group, free))
         return shifts, sigma, float(np.sqrt(np.mean(fit.residual**2)))
 
     def _fit(self, shifts: Array, moduli: Array) -> _Fit:
@@ -352,19 +381,43 @@ class _Fit:
         used = np.linalg.qr(self.columns[:, self.weights > 0])[0]
         return np.asarray(derivatives - used @ (used.T @ derivatives))
 
+    def deviations(self, jacobian: Array) -> Array:
+        """Return the standard deviations of the free shifts; NaN if the rows are too few.
+
+        Rows that share one variance give one estimate. The weights of the rows are not those of their scatter, so that
+        the scatter of the rows that determine a shift gives another one. The larger one counts.
+        """
+        columns = self.columns[:, self.weights > 0]
+        spare = jacobian.shape[0] - jacobian.shape[1] - columns.shape[1]
+        if spare < 1:
+            return np.full(jacobian.shape[1], np.nan)
+        inverse = np.linalg.pinv(jacobian)
+        equal = self.cost / spare * np.sum(inverse**2, axis=1)
+        leverage = np.sum(np.linalg.qr(np.hstack([columns, jacobian]))[0] ** 2, axis=1)
+        apart = self.residual / np.maximum(1 - leverage, _LEAST_SPARE)
+        return np.sqrt(np.maximum(equal, np.sum((inverse * apart) ** 2, axis=1)))
+
 
 def _terms(quantity: Quantity, at: Array, times: Array) -> tuple[Array, Array]:
     """Return the columns of a series at frequencies or times, and their derivatives by the logarithm of these."""
-    one, zero = np.ones((at.size, 1)), np.zeros((at.size, 1))
+    if quantity == "storage and loss":
+        half = at.size // 2
+        storage = _terms("storage", at[:half], times)
+        loss = _terms("loss", at[half:], times)
+        none = np.zeros((half, 1))
+        stacked = [np.vstack([above, np.hstack([none, below])]) for above, below in zip(storage, loss, strict=True)]
+        return stacked[0], stacked[1]
+    ones = np.ones((at.size, 1))
+    zero = np.zeros((at.size, 1))
     if quantity in ("storage", "loss"):
         x = at[:, None] * times
         below = 1 + x**2
         if quantity == "storage":
-            return np.hstack([one, x**2 / below]), np.hstack([zero, 2 * x**2 / below**2])
+            return np.hstack([ones, x**2 / below]), np.hstack([zero, 2 * x**2 / below**2])
         return x / below, x * (1 - x**2) / below**2
     x = at[:, None] / times
     decay = np.exp(-x)
     if quantity == "relaxation":
-        return np.hstack([one, decay]), np.hstack([zero, -x * decay])
+        return np.hstack([ones, decay]), np.hstack([zero, -x * decay])
     flow = at[:, None] / at.max()
-    return np.hstack([one, flow, -np.expm1(-x)]), np.hstack([zero, flow, x * decay])
+    return np.hstack([ones, flow, -np.expm1(-x)]), np.hstack([zero, flow, x * decay])

@@ -33,22 +33,29 @@ _OFFERED = (1, 1.5, 2, 3, 4, 6, 12, 24)
 _FEWER = 1.1
 #: Number of values per decade below which a smooth spectrum is fitted, its terms per decade, and the weight of the
 #: differences between neighbouring terms next to the misfit of the rows.
-_FEW, _SMOOTH, _STEPS = 2.5, 3, 0.01
+_FEW = 2.5
+_SMOOTH = 3
+_STEPS = 0.01
 #: Largest time of a term, over the last time: a slower term is a plateau.
 _SLOWER = 3.0
 #: First time over the shortest time of a term, and rms misfit below which more terms are not tried. For moduli: the
 #: rows hardly determine a faster term, and rheometers are not more accurate. For creep: a fast term rises from the
 #: given instantaneous compliance, and the terms are chosen later, for a program.
-_MODULI, _CREEP = (3.0, 2e-4), (10.0, 1e-7)
+_MODULI = (3.0, 2e-4)
+_CREEP = (10.0, 1e-7)
 #: Largest ratio of moduli measured at one frequency and one temperature, and largest relative difference of frequencies
 #: that count as equal. The ratio refuses all of 14 tables with several temperatures or amplitudes, and none of 56
 #: others, whose largest ratio was 1.02 to 1.06.
-_ONE_TEMPERATURE, _SAME_FREQUENCY = 1.1, 1e-3
+_ONE_TEMPERATURE = 1.1
+_SAME_FREQUENCY = 1e-3
 #: Decades before the first time of a relaxation test that are extrapolated, and scale of these rows over their modulus;
 #: largest time of the rows that are continued, over the first one, their smallest number, and the ratio of the first to
 #: the mean slope from which they are the tail of one process.
-_EXTRAPOLATED, _BEFORE = 1.5, 10.0
-_FIRST_ROWS, _FEWEST_ROWS, _STEEPER = 4.0, 4, 2.0
+_EXTRAPOLATED = 1.5
+_BEFORE = 10.0
+_FIRST_ROWS = 4.0
+_FEWEST_ROWS = 4
+_STEEPER = 2.0
 #: Largest ratio of values at equal, rounded times.
 _EQUAL_TIMES = 2.0
 #: Part of the largest compliance below which a row at most zero is left out, if the noise is less.
@@ -270,7 +277,7 @@ def dynamic_table(
     are fitted together by non-negative least squares, each relative to itself, or to a thousandth of ``|G*|`` where
     it is smaller. A large misfit means that the two moduli do not belong to one passive material.
 
-    The shift factors of several temperatures are those with which the storage moduli agree best with one positive
+    The shift factors of several temperatures are those with which the moduli agree best with one positive
     series (:func:`~roughvisc.mechanics.materials.superposition.superpose`). Between the measured temperatures
     ``log a_T`` is interpolated over ``1/T``. ``material.at(temperature)`` is the material at another temperature.
 
@@ -329,7 +336,8 @@ class _Measured:
         names = ("frequency or time", *["value"] * (len(columns) - 1), "temperature")
         *_, measured = _columns(names, *columns, temperatures)
         _, group = groups_of(measured)
-        lowest, highest = float(measured.min()), float(measured.max())
+        lowest = float(measured.min())
+        highest = float(measured.max())
         within = f"{lowest - 273.15:.4g} to {highest - 273.15:.4g} degC"
         if group.max() == 0:
             if temperature is not None and not lowest <= temperature <= highest:
@@ -339,9 +347,9 @@ class _Measured:
             expected = f"the temperature of the contact, within the measured ones, {within}"
             raise InputError(key="temperature", found=None, expected=expected)
         law = _superposed(self, *(tuple(column.tolist()) for column in (*columns, measured)))
-        found = law.at(temperature)
-        assert isinstance(found, Prony)
-        return found
+        material = law.at(temperature)
+        assert isinstance(material, Prony)
+        return material
 
     def checked(self, columns: Columns, rows: NDArray[np.intp] | None = None) -> _Checked:
         """Return the columns of one temperature without rows that are noise.
@@ -373,7 +381,9 @@ class _Measured:
             left_out = int(np.count_nonzero(~kept))
             if left_out:
                 notes.append(f"{left_out} rows at most zero left out")
-            t, values, rows = t[kept], values[kept], rows[kept]
+            t = t[kept]
+            values = values[kept]
+            rows = rows[kept]
         elif values[t == 0].size and values[t == 0].min() <= 0:
             raise InputError(f"table row {rows[0]}: modulus is {values[0]:g} at time zero: expected a positive modulus")
         first = np.flatnonzero(np.diff(t, prepend=-1.0) > 0)
@@ -383,7 +393,9 @@ class _Measured:
             for place in first[np.flatnonzero((ratio > _EQUAL_TIMES) & (t[first] > 0))][:1]:
                 again = f"other {name} than a row with the same time, {t[place]:g} s"
                 raise InputError(f"table row {rows[place]}: {again}: several temperatures? expected one; {_TELL}")
-            t, values, rows = t[first], np.add.reduceat(values, first) / counts, rows[first]
+            t = t[first]
+            values = np.add.reduceat(values, first) / counts
+            rows = rows[first]
             notes.append(f"{equal + np.count_nonzero(counts > 1)} rows of equal times averaged")
         if t.size < 2:
             raise InputError(f"table has {t.size} rows with a time of their own: expected at least two")
@@ -392,8 +404,8 @@ class _Measured:
             for place in np.flatnonzero(highest - values > self.noise * highest[-1])[:1]:
                 below = f"compliance is {1 - values[place] / highest[place]:.2%} below an earlier row"
                 expected = "ascending compliances or more noise"
-                found = f"{below}, noise is {self.noise:g} of the largest"
-                raise InputError(f"table row {rows[place]}: {found}: expected {expected}")
+                problem = f"{below}, noise is {self.noise:g} of the largest"
+                raise InputError(f"table row {rows[place]}: {problem}: expected {expected}")
         return _Checked((t, values), "; ".join(notes), left_out)
 
     def _checked_moduli(self, columns: Columns, rows: NDArray[np.intp]) -> Columns:
@@ -410,8 +422,8 @@ class _Measured:
         order = np.argsort(omega, kind="stable")
         first = np.flatnonzero(np.diff(np.log(omega[order]), prepend=-np.inf) > _SAME_FREQUENCY)
         if first.size < 2:
-            found = f"table has one frequency, {omega[0]:g} rad/s: expected several frequencies"
-            raise InputError(f"{found}; an amplitude sweep or a temperature ramp? {_TELL}")
+            problem = f"table has one frequency, {omega[0]:g} rad/s: expected several frequencies"
+            raise InputError(f"{problem}; an amplitude sweep or a temperature ramp? {_TELL}")
         if self.is_master:
             return columns
         ratio = np.maximum.reduceat(size[order], first) / np.minimum.reduceat(size[order], first)
@@ -425,7 +437,8 @@ class _Measured:
     def series(self, checked: _Checked) -> Prony:
         """Return the series fitted to rows of one temperature."""
         factor = tensile_to_shear(self.kind, self.poisson)
-        about, columns = joined(self.note, checked.note), checked.columns
+        about = joined(self.note, checked.note)
+        columns = checked.columns
         if self.quantity == "creep":
             return self._creep(columns[0], columns[1] * factor, about, checked.left_out > 0)
         if self.quantity == "relaxation":
@@ -437,13 +450,17 @@ class _Measured:
         highest = float(values.max())
         weights = (highest / np.where(values > 0, values, highest)) ** 2
         ascending = np.maximum.accumulate(scipy.optimize.isotonic_regression(values, weights=weights).x)
-        rows, measured = t[t > 0], values[t > 0]
-        before, softer, glassy = np.zeros(0), np.zeros(0), float(ascending[0])
+        rows = t[t > 0]
+        measured = values[t > 0]
+        before = np.zeros(0)
+        softer = np.zeros(0)
+        glassy = float(ascending[0])
         if t[0] > 0:
             glassy = _instantaneous(rows, ascending)
         if t[0] > 0 and is_late:
             before, softer = _earlier_creep(rows, ascending, glassy)
-        times, course = np.append(before, rows), np.append(softer, measured)
+        times = np.append(before, rows)
+        course = np.append(softer, measured)
         scale = np.append(_BEFORE * softer, measured)
 
         def columns(tau: Array) -> Array:
@@ -470,7 +487,8 @@ class _Measured:
         # rows at most zero state that all moduli are known to the noise of the largest
         scale = np.maximum(shear, self.noise * shear.max()) if shear.min() <= 0 else shear
         before, stiffer = _earlier(t, scale)
-        times, target = np.append(before, t), np.append(stiffer, shear)
+        times = np.append(before, t)
+        target = np.append(stiffer, shear)
         course = np.append(stiffer, scale)
         scale = np.append(_BEFORE * stiffer, scale)
         later = times > 0
@@ -488,18 +506,20 @@ class _Measured:
         return relaxation_series(float(weights[0]), weights[1:], theta, self.poisson, **about)
 
     def _dynamic(self, omega: Array, elastic: Array, viscous: Array, note: str) -> Prony:
-        size, at = np.hypot(elastic, viscous), 1 / omega
-        order = np.argsort(at, kind="stable")
+        size = np.hypot(elastic, viscous)
+        ages = 1 / omega
+        order = np.argsort(ages, kind="stable")
         is_noisy = min(elastic.min(), viscous.min()) < 0
         least = (self.noise if is_noisy else 1e-3) * size
-        target, scale = np.append(elastic, viscous), np.append(np.maximum(elastic, least), np.maximum(viscous, least))
+        target = np.append(elastic, viscous)
+        scale = np.append(np.maximum(elastic, least), np.maximum(viscous, least))
 
         def columns(theta: Array) -> Array:
             x = omega[:, None] * theta
             in_phase = np.column_stack([np.ones(omega.size), x**2 / (1 + x**2)])
             return np.vstack([in_phase, np.column_stack([np.zeros(omega.size), x / (1 + x**2)])])
 
-        weights, theta, fit = _fitted(columns, at[order], size[order], target, scale, _MODULI)
+        weights, theta, fit = _fitted(columns, ages[order], size[order], target, scale, _MODULI)
         text = f"{fit.note}, frequencies {omega.min():g} to {omega.max():g} rad/s"
         if is_noisy:
             text += f"; moduli are known to {self.noise:g} of |G*|, since some are negative"
@@ -511,9 +531,11 @@ class _Measured:
         if fit.rms <= self.noise:
             return ""
         table = "dynamic" if self.quantity == "dynamic" else "relaxation"
-        found = f"The rows of the {table} table deviate by {fit.rms:.2g} (rms, {fit.largest:.2g} at most) from every"
+        deviation = (
+            f"The rows of the {table} table deviate by {fit.rms:.2g} (rms, {fit.largest:.2g} at most) from every"
+        )
         causes = "a wrong column or unit, several temperatures, or the compliance of the instrument"
-        return f"{found} passive material, more than the noise {self.noise:g}: {causes}?"
+        return f"{deviation} passive material, more than the noise {self.noise:g}: {causes}?"
 
 
 @lru_cache(maxsize=8)
@@ -535,27 +557,32 @@ def _superposed(known: _Measured, *columns: tuple[float, ...]) -> ThermalLaw:
     of_parts = []
     for number_of_group in range(int(group.max()) + 1):
         rows = np.flatnonzero(group == number_of_group)
-        part = known.checked(tuple(column[rows] for column in given), rows)
-        parts.append(part)
-        of_parts.append(np.full(part.columns[0].size, temperatures[rows].mean()))
-    at, *values = (np.concatenate(column) for column in zip(*(part.columns for part in parts), strict=True))
+        one_temperature = known.checked(tuple(column[rows] for column in given), rows)
+        parts.append(one_temperature)
+        of_parts.append(np.full(one_temperature.columns[0].size, temperatures[rows].mean()))
+    at, *values = (
+        np.concatenate(column) for column in zip(*(one_temperature.columns for one_temperature in parts), strict=True)
+    )
     names: tuple[Any, ...] = ("storage", "loss") if known.quantity == "dynamic" else (known.quantity,)
     later = at > 0  # a row at time zero has no reduced time
     values = [value[later] for value in values]
     is_noisy = known.quantity == "relaxation" and values[0].min() <= 0
     least = known.noise * float(values[0].max()) if is_noisy else 0.0
     rows_of = dict(zip(names, values, strict=True))
-    found = superpose(np.concatenate(of_parts)[later], at[later], rows_of, known.vertical, least)
-    found = replace(found, bounds=(float(temperatures.min()), float(temperatures.max())), factor=factor)
-    reduced, rows_at_reference = found.reduced()
+    superposed = superpose(np.concatenate(of_parts)[later], at[later], rows_of, known.vertical, least)
+    superposed = replace(superposed, bounds=(float(temperatures.min()), float(temperatures.max())), factor=factor)
+    reduced, rows_at_reference = superposed.reduced()
     order = np.argsort(reduced, kind="stable")
     master = (reduced[order], *(value[order] for value in rows_at_reference.values()))
-    notes = [found.note, *dict.fromkeys(part.note for part in parts)]
-    checked = _Checked(master, "; ".join(filter(None, notes)), sum(part.left_out for part in parts))
+    notes = [superposed.note, *dict.fromkeys(one_temperature.note for one_temperature in parts)]
+    checked = _Checked(
+        master, "; ".join(filter(None, notes)), sum(one_temperature.left_out for one_temperature in parts)
+    )
     material = known.series(checked)
-    material = replace(material, warning=joined(material.warning, found.warning, " "))
-    shift, moduli = found.shift_factor, found.modulus_factor if known.vertical == "rubber" else None
-    return ThermalLaw(material, found.reference_temperature, shift, moduli)
+    material = replace(material, warning=joined(material.warning, superposed.warning, " "))
+    shift = superposed.shift_factor
+    moduli = superposed.modulus_factor if known.vertical == "rubber" else None
+    return ThermalLaw(material, superposed.reference_temperature, shift, moduli)
 
 
 def joined(first: str, second: str, sign: str = "; ") -> str:
@@ -582,8 +609,8 @@ def _columns(names: tuple[str, ...], *columns: ArrayLike) -> Columns:
     arrays = tuple(np.asarray(column, dtype=float) for column in columns)
     sizes = [array.size for array in arrays]
     if any(array.ndim != 1 for array in arrays) or len(set(sizes)) > 1 or sizes[0] < 2:
-        found = ", ".join(f"{size} of {name}" for size, name in zip(sizes, names, strict=True))
-        raise InputError(f"table has {found}: expected as many, at least two")
+        sizes_text = ", ".join(f"{size} of {name}" for size, name in zip(sizes, names, strict=True))
+        raise InputError(f"table has {sizes_text}: expected as many, at least two")
     for name, array in zip(names, arrays, strict=True):
         is_possible = np.isfinite(array) & ((array >= 0) | (name not in ("time", "frequency", "shift factor")))
         for row in np.flatnonzero(~is_possible)[:1]:
@@ -634,19 +661,23 @@ def _fitted(
     for per_decade in (_SMOOTH,) if sparse else _OFFERED:
         times = lattice(float(at[0]) / most[0], float(at[-1]) * _SLOWER, per_decade)
         terms = columns(times)
-        rows, wanted = terms / scale[:, None], target / scale
+        rows = terms / scale[:, None]
+        wanted = target / scale
         if sparse:
             sizes = np.interp(np.log(times), np.log(at), course)
             smooth = np.pad(np.diff(np.diag(_STEPS / sizes), axis=0), ((0, 0), (1, 0)))
-            rows, wanted = np.vstack([rows, smooth]), np.append(wanted, np.zeros(len(smooth)))
+            rows = np.vstack([rows, smooth])
+            wanted = np.append(wanted, np.zeros(len(smooth)))
         weights = nonnegative(rows, wanted, np.ones(len(rows)))
-        misfit, used = np.abs((terms @ weights - target) / scale), np.append(True, weights[1:] > 0)
+        misfit = np.abs((terms @ weights - target) / scale)
+        used = np.append(True, weights[1:] > 0)
         misfit = misfit[unmeasured:]
         rms = float(np.sqrt(np.mean(misfit**2)))
         fits.append((rms, float(misfit.max()), weights[used], times[used[1:]]))
     enough = max(_FEWER * min(fit[0] for fit in fits), most[1])
     rms, largest, weights, times = min((fit for fit in fits if fit[0] <= enough), key=lambda fit: fit[3].size)
-    count, misfits = np.count_nonzero(weights), f"largest misfit {largest:.2g}, rms {rms:.2g} (relative)"
+    count = np.count_nonzero(weights)
+    misfits = f"largest misfit {largest:.2g}, rms {rms:.2g} (relative)"
     note = f"{count} terms fitted to {target.size - unmeasured} values, {misfits}"
     return weights, times, _Fit(rms, largest, note, _gap(at))
 
@@ -659,7 +690,7 @@ def _gap(times: Array) -> str:
     ratios = times[1:] / times[:-1]
     if ratios.max(initial=1.0) <= _DECADE:
         return ""
-    before, after = (format_quantity(float(one), "s") for one in times[ratios.argmax() :][:2])
+    before, after = (format_quantity(float(time), "s") for time in times[ratios.argmax() :][:2])
     what = f"The table of the material has no row between {before} and {after}, more than a decade"
     return f"{what}: the material between is a guess that stated errors do not include. Use one row per decade."
 
@@ -676,7 +707,8 @@ def _earlier(times: Array, moduli: Array) -> tuple[Array, Array]:
     first = times <= _FIRST_ROWS * times[0]
     if times[0] == 0 or np.count_nonzero(first) < _FEWEST_ROWS:
         return nothing, nothing
-    x, y = np.log(times[first] / times[0]), np.log(moduli[first])
+    x = np.log(times[first] / times[0])
+    y = np.log(moduli[first])
     decade = times <= 10 * times[0]
     of_decade, _ = np.polyfit(np.log(times[decade]), np.log(moduli[decade]), 1)
     mean = max(np.polyfit(x, y, 1)[0], of_decade)
@@ -711,9 +743,10 @@ def _instantaneous(times: Array, compliances: Array) -> float:
     The course is a power law ``J(0) + a t^alpha`` through both ends and the middle of the decade, or logarithmic creep
     that began a decade earlier, whichever falls less. An exponent above one counts as one.
     """
-    first, span = float(compliances[0]), min(10.0, times[-1] / times[0])
-    at = np.log(times[0]) + np.log(span) * np.array([0.5, 1.0])
-    middle, end = (float(value) for value in np.interp(at, np.log(times), compliances))
+    first = float(compliances[0])
+    span = min(10.0, times[-1] / times[0])
+    logarithms = np.log(times[0]) + np.log(span) * np.array([0.5, 1.0])
+    middle, end = (float(value) for value in np.interp(logarithms, np.log(times), compliances))
     ratio = min((end - middle) / (middle - first), np.sqrt(span)) if middle > first else np.sqrt(span)
     power = (middle - first) / (ratio - 1) if ratio > 1 else np.inf
     logarithmic = (end - first) / np.log(span) * (1 + np.log(10))

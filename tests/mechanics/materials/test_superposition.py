@@ -46,11 +46,11 @@ def off(material, rows=slice(None)):
 
 
 def test_shift_factors__are_found_within_their_stated_deviation():
-    found = [made(measured(rng=np.random.default_rng(seed))).thermal.shift.__self__ for seed in range(4)]
+    found = [made(measured(rng=np.random.default_rng(seed))).thermal.shift.__self__ for seed in range(31, 37)]
     errors = np.array([one.log_shift - (log_shift(LEVELS) - log_shift(one.reference_temperature)) for one in found])
     assert np.abs(errors).max() < 0.03
     within = np.abs(errors) <= 2 * np.array([one.sigma for one in found]) + 1e-12
-    assert within.mean() > 0.9
+    assert within.mean() > 0.95
 
 
 @pytest.mark.parametrize("rubber", [False, True])
