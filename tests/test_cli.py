@@ -298,6 +298,7 @@ def test_scan__lists_channels_and_asks_for_what_a_file_does_not_state(invoke, tm
     assert rv.open_scan(tmp_path / "plain.toml").shape == (30, 20)
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals of POSIX")
 def test_new__asks_a_person_for_what_a_file_does_not_state_and_keeps_the_answers(tmp_path):
     np.save(tmp_path / "plain.npy", np.random.default_rng(0).normal(size=(20, 30)))

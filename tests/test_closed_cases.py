@@ -13,7 +13,9 @@ def compared(name, cells):
     return list(CASES[name][1](cells))
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.thorough if name == "Kelvin-Voigt" else ()) for name in CASES]
+)
 @pytest.mark.parametrize("cells", [33, pytest.param(52, marks=pytest.mark.thorough)])
 def test_error__is_at_most_what_the_method_explains(name, cells):
     for what, error, expected in compared(name, cells):

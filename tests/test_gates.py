@@ -10,6 +10,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 PACKAGE = Path(__file__).parents[1] / "roughvisc"
 #: What is added -> file -> existing lines, and what is inserted after each.
 ADDED = {
@@ -109,6 +111,7 @@ def guide(part):
     return changes
 
 
+@pytest.mark.thorough
 def test_setting_variable_step_and_material__are_added_in_few_files(tmp_path):
     changes = guide("A variable")
     ((_, test),) = changes.pop("tests/experiment/test_rows.py").items()

@@ -116,7 +116,12 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+SLOW = ("layers", "slide on layers", "slide", "mirror")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.thorough if name in SLOW else ()) for name in CASES]
+)
 def test_rows_and_steps_of_a_program__are_neutral_to_units_and_axes(name):
     height, body, program, settings = CASES[name]
     settings = {

@@ -82,6 +82,7 @@ def test_thin_sheet__is_stiffer_than_a_half_space_the_more_the_deeper_the_ball(t
     assert (np.diff(ratio, prepend=1.0) > 0).all()
 
 
+@pytest.mark.thorough
 def test_coating__that_is_thicker_has_more_contact(tmp_path, script):
     figure = script("coating").main(cells=20, figure=tmp_path / "figure.png", speeds=[1e-2, 1.0])
     area = np.array([line.get_ydata() for line in figure.axes[2].lines])

@@ -65,7 +65,12 @@ SCENES = {
 }
 
 
-@pytest.mark.parametrize("name", SCENES)
+SLOW = ("soft", "loss of contact", "slide", "layer, free")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.thorough if name in SLOW else ()) for name in SCENES]
+)
 def test_simulate__on_a_device_gives_what_a_cpu_gives(gpu, monkeypatch, name):
     monkeypatch.setattr("roughvisc.mechanics.stepping.PACKED_FROM", 300)  # packs the pressures of most scenes
     height, body, program, settings = SCENES[name]
@@ -91,7 +96,9 @@ def test_friction__on_a_device_is_that_of_a_cpu(gpu, boundary):
         np.testing.assert_allclose(found[variable], expected[variable], rtol=0, atol=1e-7 * scale, err_msg=variable)
 
 
-@pytest.mark.parametrize("name", ["part of a ball", "slide", "layer", pytest.param("soft", marks=pytest.mark.thorough)])
+@pytest.mark.parametrize(
+    "name", ["part of a ball", *(pytest.param(name, marks=pytest.mark.thorough) for name in ("slide", "layer", "soft"))]
+)
 def test_run__that_was_stopped_on_a_device_continues_to_the_same_bits(gpu, name, tmp_path):
     height, body, program, settings = SCENES[name]
     settings = Settings(times=6, **({"boundary": "free"} | settings), device="gpu")

@@ -104,6 +104,7 @@ def test_creep_table__warns_if_rows_are_more_than_a_decade_apart(rows, sparse):
     assert (abs(float(found.approach[0] / expected.approach[0]) - 1) > 0.1) == sparse
 
 
+@pytest.mark.thorough
 def test_every_step__of_a_body_without_instantaneous_compliance_states_the_tolerance_or_less():
     """If each step is asked for, those that state more are no rows; the corners of the program always are."""
     ball, rubber = rv.sphere(1e-2, 1e-3, (21, 18)), rv.kelvin_voigt(1e6, 1e6, 0.3)

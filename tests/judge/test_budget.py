@@ -111,6 +111,7 @@ def test_grid__holds_the_change_to_cells_half_as_long_and_not_much_more(tmp_path
     assert np.median(over) < 10
 
 
+@pytest.mark.thorough
 def test_missing_waves__count_on_one_side(tmp_path):
     """Waves that are not held lessen the contact area and open the gap; the further down they go, the more."""
     study, names = case(ROUGH, tmp_path), ["contact_area", "mean_gap"]
@@ -163,6 +164,7 @@ def test_indenter__has_no_sample_and_no_further_waves(tmp_path):
     assert found.attrs["open"] == "modulus"
 
 
+@pytest.mark.thorough
 def test_closed_gap__has_no_interval(tmp_path):
     """The leak rate of a map in which contact percolates is zero, and has no logarithm."""
     study = case(ROUGH, tmp_path, **{"program.0.pressure": "3 MPa", "keep.fields": ["gap"]})

@@ -40,6 +40,7 @@ def test_uncertainty_of_the_reference__holds_its_error_against_lee_and_radok(tmp
     assert (unsure < 10 * true).all()
 
 
+@pytest.mark.thorough
 def test_finer_grid__has_the_smaller_errors_and_transforms_more_cells(tmp_path):
     ds = measured(case_of(tmp_path), (1e-3, 2.0), (1e-3, 1), (1e-3, 0.5))
     assert (np.diff(ds.error.values, axis=0) < 0).all()

@@ -108,6 +108,7 @@ def test_contact_at_the_very_first_instant__is_not_put_off(lead):
     assert all(step.point.force > 0 for step in steps if step.point.time > lead)
 
 
+@pytest.mark.thorough
 def test_row_just_before_an_imprint_closes__states_the_force_to_which_it_jumps():
     """A Kelvin-Voigt body carries a large force as soon as its imprint closes: a row at that time may be either."""
     program = rv.Program().approach(0.05, over=0.5).approach(-0.02, over=0.1).approach(0.05, over=0.2)

@@ -88,7 +88,12 @@ ON_LAYER = rv.layer(VISCOUS, 1e-5, on=rv.elastic(1e7))
 
 @pytest.mark.parametrize(
     ("on", "hold", "boundary"),
-    [(VISCOUS, 0, "free"), (VISCOUS, 0.1, "free"), (ON_LAYER, 0, "free"), (ON_LAYER, 0.1, "periodic")],
+    [
+        (VISCOUS, 0, "free"),
+        pytest.param(VISCOUS, 0.1, "free", marks=pytest.mark.thorough),
+        (ON_LAYER, 0, "free"),
+        pytest.param(ON_LAYER, 0.1, "periodic", marks=pytest.mark.thorough),
+    ],
     ids=["half-space", "half-space, held", "layer", "layer, held"],
 )
 def test_layer_on_a_body_without_instantaneous_compliance__is_at_first_a_bonded_sheet(on, hold, boundary):

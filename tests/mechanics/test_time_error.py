@@ -58,7 +58,10 @@ def test_time_error__covers_the_true_one_and_not_by_far(monkeypatch):
 
 @pytest.mark.parametrize(
     ("surface", "material", "program"),
-    [("sphere", "soft", "held_load"), *((surface, "zener", program) for surface in SURFACES for program in PROGRAMS)],
+    [
+        pytest.param("sphere", "soft", "held_load", marks=pytest.mark.thorough),
+        *((surface, "zener", program) for surface in SURFACES for program in PROGRAMS),
+    ],
 )
 def test_every_step_that_is_a_row__keeps_the_tolerance(surface, material, program):
     found = pressed(surface, MATERIALS[material], PROGRAMS[program], times=None)

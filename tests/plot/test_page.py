@@ -53,6 +53,7 @@ def read(path, steps, places, tmp_path):
     return shown
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
 def test_page__shows_in_a_browser_what_the_results_contain(tmp_path):
     one = made.rough_creep((24, 20), 5).assign_attrs(title=HOSTILE)

@@ -252,8 +252,10 @@ def test_rows_beyond_the_checkpoint__do_not_count(whole, tmp_path, state):
 @pytest.mark.parametrize(
     ("name", "most"),
     [
-        ("modes", "2"),
-        *(pytest.param(name, "3", marks=pytest.mark.thorough) for name in ("sliding", "pulled", "layer", "curve")),
+        *(
+            pytest.param(name, "3", marks=pytest.mark.thorough)
+            for name in ("modes", "sliding", "pulled", "layer", "curve")
+        ),
         *(pytest.param(name, "24", marks=pytest.mark.long) for name in CASES),
     ],
 )

@@ -91,7 +91,8 @@ def test_run__on_a_cluster_by_its_scheduler_file(study, tmp_path, by_hand):
     assert "4, 4 of them before" in done.stdout
 
 
-@pytest.mark.parametrize("workers", [pytest.param(2, marks=pytest.mark.thorough), 0])
+@pytest.mark.thorough
+@pytest.mark.parametrize("workers", [2, 0])
 def test_run__shows_each_warning_once_and_names_its_case(study, tmp_path, workers):
     """A steep indenter of three loads: the loaded surface of two of them is steeper than the method allows."""
     steep = BALL.replace('"10 mm"', '"0.1 mm"').replace('"1 mm"', '"0.4 mm"')
@@ -196,6 +197,7 @@ def test_sweep__ends_with_one_message_on_a_full_disk(study, tmp_path, monkeypatc
     assert sweep(cases, tmp_path / "out", workers=0, progress=False).sizes["case"] == 4
 
 
+@pytest.mark.thorough
 def test_sweep__computes_cases_of_much_memory_in_fewer_processes(study, tmp_path, monkeypatch):
     """A case fits if one process has all the memory, and not if four share it."""
     cases = study()
