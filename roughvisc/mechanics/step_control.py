@@ -276,9 +276,9 @@ def added(scene: Scene, pair: Pair, number: int, following: float, scales: tuple
         change = min(change, float(abs(at_end - memory.remaining(taken) * at_start).sum()))
         ahead = following - second.time
         left = 1.0
-        if not by_load:  # what relaxes within the pair is no longer part of the change
-            ahead = following - pair.start.time
-            left = memory.remaining(taken)
+        if not by_load:  # what relaxes from the middle of the pair on is no longer part of the change
+            ahead = following - pair.first.time
+            left = memory.remaining(taken / 2)
         remains = max(memory.remaining(ahead) / left if left > 0 else 0.0, LEAST_REMAINING)
     error = change * scene.grid.cell_area / scales[0] * remains
     if by_load:
