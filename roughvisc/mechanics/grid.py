@@ -34,7 +34,7 @@ Array = Any  # an array of NumPy or CuPy
 Boundary = Literal["free", "periodic", "mirror"]
 
 #: Number of rows in a block of rows; bytes of a block of columns, and its least number of columns. A block is
-#: transformed at once and fits in the cache: whole fields take up to 1.5 times as long (measured, 64 to 1,024 squared).
+#: transformed in one call and fits in the cache: whole fields take up to 1.5 times as long (64 to 1,024 squared).
 ROWS = 128
 COLUMN_BYTES = 1 << 18
 COLUMNS = 32
@@ -164,7 +164,7 @@ class Grid:
         self.symbol = xp.asarray(self.symbol_of(kernel) if symbol is None else symbol)
         self.definite = boundary == "free" or float(self.symbol[0, 0]) > 0
         self.largest_eigenvalue = float(self.symbol.max()) or spacing[0]
-        number = np.arange(self.symbol.shape[1])  # of the wave along y, which stands for the negative number too
+        number = np.arange(self.symbol.shape[1])  # of the wave along y; also counts the negative number
         twice = (boundary != "mirror") & (number > 0) & (2 * number < self.points[1])
         self.self_influence = float((self.symbol.sum(axis=0) * xp.asarray(1.0 + twice)).sum()) / math.prod(self.points)
         self.convolutions = 0

@@ -474,7 +474,7 @@ def _of_layers(body: LayeredBody, duration: float, share: float, shortest: float
     """Return the memory of a layered body: exponentials that all waves share."""
     given = body.materials
     found, errors = zip(*(_series(one, shortest, duration, MATERIALS_SHARE * share) for one in given), strict=True)
-    # the series of the waves need not be much more accurate than those of the materials
+    # the series of the waves need not be much more accurate than the series of the materials
     waves = layer_series(body.of(found), shortest, duration, max(share - max(errors), SERIES_SHARE * max(errors)))
     memory = LayerMemory(waves, duration, grid)
     memory.series_error = waves.error + max(errors)

@@ -229,7 +229,7 @@ class Program:
         return self + Program((Segment(control, number(over, "s", "over", least=0), end),))
 
     def __add__(self, other: Program) -> Program:
-        """Return this program followed by another one, whose first ramp begins where this program ends."""
+        """Return this program followed by another one, whose first ramp begins at the last value of this program."""
         return Program(self.segments + other.segments, " ".join(filter(None, (self.note, other.note))))
 
     def load(self, value: float | str, *, over: float | str) -> Program:

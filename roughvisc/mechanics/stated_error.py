@@ -42,15 +42,15 @@ ENTERED = 0.3
 SHARED = 0.1
 #: Pressure of a cell that may have entered the contact of a soft body, over the mean pressure.
 ENTERING = 2.5
-#: Error of a quantity that has no second solution, as a part of it. The change of the pressure in a slide by one cell,
-#: and the work of a force that is taken as linear over the approach and vanishes at one end: on a sphere the error is a
-#: fifth of it, on a cone a third.
+#: Relative error of a quantity without a second solution. Used for the pressure change in a slide by one cell,
+#: and for the work of a force that vanishes at one end and is taken as linear over the approach. On a sphere the error
+#: is a fifth of this work, on a cone a third.
 UNBOUNDED = 0.25
-#: Power of the part of the friction force that decays in a step of a hold, in the error of what is left of the force.
+#: Power of the part of the friction force that decays in a step of a hold, in the error of the remaining force.
 #: Without: 5 of 9,367 rows bad instead of 3 (`closed_forms.py slides-friction --scenes 300`, seeds 51 and 52); with 3,
 #: as many, and stated over true error 2 % larger.
 UNRESOLVED = 4.0
-#: Force and approach are parabolas over a pair only if each of its steps covers at least this part of it.
+#: Force and approach are parabolas over a pair only if each step covers at least this part of the pair.
 LEAST_PART = 0.1
 
 
@@ -102,7 +102,7 @@ class Difference:
             pressure=max(self.pressure, part * former.pressure),
             force=max(self.force, part * former.force),
             approach=max(self.approach, LASTING * former.approach),
-            friction=max(self.friction, max(left, left_of_friction) * former.friction),  # both may share all of it
+            friction=max(self.friction, max(left, left_of_friction) * former.friction),  # may be all shared
             shared=self.shared + left * former.shared,
         )
 
@@ -347,7 +347,7 @@ def transient_error(scene: Scene, start: Point, first: Point, end: Point, *, by_
     At a corner the rate of the prescribed quantity changes. A given approach then adds to the force a part that follows
     ``S(t)``, the integral of the relaxation function. With a pressure that is linear within the step, this part is
     ``h^2 / I(h)`` after the first step instead, with the integral ``I`` of the compliance. The work has the integral of
-    a parabola in place of the integral of ``S``. Both errors count twice, because the rate may change its sign. If the
+    a parabola instead of the integral of ``S``. Both errors count twice, because the rate may change its sign. If the
     compliance grows much within the step, the error may be as large as the part ``1 - h R(h) / S(h)`` of the force that
     relaxes in it, with the relaxation function ``R``. It remains to the end of the pair.
 

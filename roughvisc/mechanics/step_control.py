@@ -1,7 +1,7 @@
 """Lengths of the pairs of steps: the error that a pair adds, and the length of the next pair.
 
-`python workflows/benchmarks/step_constants.py "NAME=VALUE"` shows what a constant buys. Numbers below are from it,
-unless another command stands with them: convolutions of plain scenes with 1, 10 and 50 kept times, over those with the
+`python workflows/benchmarks/step_constants.py "NAME=VALUE"` shows the effect of a constant. Numbers below are from it,
+unless another command is named: convolutions of plain scenes with 1, 10 and 50 kept times, over those with the
 present value, and rows of cells in contact beyond the tolerance with one kept time, of 300, and with twenty, of 1,000.
 """
 
@@ -276,7 +276,7 @@ def added(scene: Scene, pair: Pair, number: int, following: float, scales: tuple
         change = min(change, float(abs(at_end - memory.remaining(taken) * at_start).sum()))
         ahead = following - second.time
         left = 1.0
-        if not by_load:  # what relaxes within the pair is no longer part of the change
+        if not by_load:  # the change excludes the relaxation within the pair
             ahead = following - pair.start.time
             left = memory.remaining(taken)
         remains = max(memory.remaining(ahead) / left if left > 0 else 0.0, LEAST_REMAINING)

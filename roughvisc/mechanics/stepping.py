@@ -631,7 +631,7 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
             former = UNBOUNDED * float(abs(last.pressure - moved(fine.pressure, 1)).sum()) * grid.cell_area
         shared = max(former - error.pressure, 0.0)
         error = replace(error.or_larger(state.difference), pressure=error.pressure)
-    if cells == 1 and not memory.is_elastic:  # there is no solution with longer steps
+    if cells == 1 and not memory.is_elastic:  # a solution with longer steps does not exist
         error = replace(error, friction=abs(friction(scene, last, slide)))
     error = replace(error, shared=shared).at_least(state.difference, relaxed)
     step = points[1].time - fine.time

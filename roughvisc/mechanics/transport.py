@@ -178,7 +178,7 @@ def flow(gap: Array, spacing: tuple[float, float], *, wrap: bool = False) -> Flo
     error as large as the conductance.
 
     By Dirichlet's principle the dissipation of approximate pressures exceeds the conductance [2]_. The excess is the
-    work of what flows into the cells and not out of them on the remaining error of the pressures, which the next round
+    work of the net flow into the cells on the remaining error of the pressures, which the next round
     solves for. The iteration ends when it is below 1e-9 of the conductance.
 
     References

@@ -261,9 +261,7 @@ def is_result_of(case: Case, path: Path) -> bool:
     except DamagedError:
         return False
     if stored_key != case.key:
-        raise unusable(
-            path, f"holds the result of case {stored_key}", f"the result of case {case.key}, as its name says"
-        )
+        raise unusable(path, f"holds the result of case {stored_key}", f"the result of case {case.key}, as in its name")
     return True
 
 

@@ -98,7 +98,7 @@ def creep_table(
     temperatures : sequence of float or str
         Temperature of each row, if there are several. The times begin again at each. [K]
     temperature : float or str
-        Temperature of the contact, within those of the rows; without a default if there are several. [K]
+        Temperature of the contact, within the range of the rows; without a default if there are several. [K]
     vertical : {"none", "rubber"}
         Whether moduli are proportional to the absolute temperature too; without a default if there are several.
     note : str
@@ -248,7 +248,7 @@ def dynamic_table(
     temperatures : sequence of float or str
         Temperature of each row, instead of shift factors. Rows within 1.5 K of each other count as one temperature. [K]
     temperature : float or str
-        Temperature of the contact, within those of the rows; without a default if there are several. [K]
+        Temperature of the contact, within the range of the rows; without a default if there are several. [K]
     vertical : {"none", "rubber"}
         Whether moduli are proportional to the absolute temperature too; without a default if there are several.
         ``"rubber"`` suits melts and rubbers, ``"none"`` polymers near the glass transition.
@@ -265,7 +265,7 @@ def dynamic_table(
     InputError
         If a number is not finite or negative by more than noise, or a frequency or a shift factor is not positive; if
         rows of one frequency have moduli that differ by more than 10 % or twice the noise; if all rows have one
-        frequency; or if the temperature is not within those of the rows. The row is named.
+        frequency; or if the temperature is outside the range of the rows. The message names the row.
 
     See Also
     --------
@@ -327,7 +327,7 @@ class _Measured:
     is_master: bool = False
 
     def at_temperature(self, columns: Columns, temperatures: Sequence[float], temperature: float | None) -> Prony:
-        """Return the material at a temperature: that of the rows, or one of several."""
+        """Return the material at the temperature of the rows, or at one of several temperatures."""
         if not len(temperatures):
             for key, value in (("temperature", temperature), ("vertical", self.vertical)):
                 if value is not None:
