@@ -96,11 +96,11 @@ class Difference:
         is_soft : bool
             Whether hardly any of the compliance is instantaneous: only the shared error fades then.
         """
-        part = LASTING if is_soft else LASTING * left
+        lasting = LASTING if is_soft else LASTING * left
         return replace(
             self,
-            pressure=max(self.pressure, part * former.pressure),
-            force=max(self.force, part * former.force),
+            pressure=max(self.pressure, lasting * former.pressure),
+            force=max(self.force, lasting * former.force),
             approach=max(self.approach, LASTING * former.approach),
             friction=max(self.friction, max(left, left_of_friction) * former.friction),  # may be all shared
             shared=self.shared + left * former.shared,
@@ -323,7 +323,7 @@ def work_of_pair(
     force = np.polynomial.Polynomial([begin[0], slopes[0], bends[0]])
     rate = np.polynomial.Polynomial([slopes[1], 2 * bends[1]])
     integral = (force * rate).integ()
-    curved = [float(integral(at)) for at in (early, last)]
+    curved = [float(integral(time)) for time in (early, last)]
     arches = curved[0] - straight[0], curved[1] - curved[0] - straight[1] + straight[0]
     works = []
     for point in inside:  # the straight line to the point itself, and its part of the arch above the step
@@ -334,8 +334,8 @@ def work_of_pair(
             ends = (first, end)
             known = curved[0]
             arch = arches[1]
-        part = (point.time - ends[0].time) / (ends[1].time - ends[0].time)
-        works.append(known + work_of_step(scene, ends[0], point) + part**3 * arch)
+        fraction = (point.time - ends[0].time) / (ends[1].time - ends[0].time)
+        works.append(known + work_of_step(scene, ends[0], point) + fraction**3 * arch)
     works.append(curved[1])
     errors = [abs(line - work) for line, work in zip(straight, curved, strict=True)]
     return works, errors[0], errors[1]
@@ -370,8 +370,8 @@ def transient_error(scene: Scene, start: Point, first: Point, end: Point, *, by_
     memory = scene.memory
     is_stiff = scene.memory.may_ring and scene.memory.grows(early, STIFF)
     if not by_load:
-        part = part_relaxed(memory, early) if is_stiff else part_missed(memory, early, last)
-        return 2 * part * abs(first.force - start.force) * abs(end.approach - touch(scene, start))
+        missed = part_relaxed(memory, early) if is_stiff else part_missed(memory, early, last)
+        return 2 * missed * abs(first.force - start.force) * abs(end.approach - touch(scene, start))
     integral, twice = memory.crept([early, last])
     determinant = early * integral[1] - last * integral[0]
     if abs(determinant) <= 1e-9 * last * abs(integral[1]):

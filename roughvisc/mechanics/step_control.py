@@ -232,8 +232,8 @@ def errors_over_allowed(
     following = second.time if lands else min(scene.next_kept(second.time), scene.program.duration)
     ahead = growth_until(scene, number, second, following)
     scales = max(force, second.size * ahead), max(approach, abs(second.approach) * ahead**0.5)
-    part = ALLOWED_SOFT if scene.is_soft else ALLOWED
-    return added(scene, pair, number, following, scales) / (part * scene.tolerance), row
+    allowed = ALLOWED_SOFT if scene.is_soft else ALLOWED
+    return added(scene, pair, number, following, scales) / (allowed * scene.tolerance), row
 
 
 def growth_until(scene: Scene, number: int, point: Point, following: float) -> float:

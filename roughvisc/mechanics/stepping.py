@@ -747,20 +747,20 @@ def take_step(
     del pressure, unit
     given: dict[str, Any] = {"load": value * alpha / area} if by_load else {"approach": value}
     try:
-        found = solve_contact(grid, gap, tolerance=tolerance, **start, **given, overwrite=True, present=scene.present)
+        contact = solve_contact(grid, gap, tolerance=tolerance, **start, **given, overwrite=True, present=scene.present)
     except ConvergenceError as error:
         raise ConvergenceError(
             f"at {time:.6g} s {error}; try a looser tolerance, a coarser grid, or layers whose moduli differ less"
         ) from error
     if grid is not scene.grid:
         scene.grid.convolutions += grid.convolutions
-    pressure = found.pressure
-    unit = found.displacement
+    pressure = contact.pressure
+    unit = contact.displacement
     pressure /= alpha
     unit /= alpha
-    force, approach = (value, found.approach) if by_load else (found.load / alpha * area, value)
+    force, approach = (value, contact.approach) if by_load else (contact.load / alpha * area, value)
     history = memory.advance(here.history, prediction, unit, pressure)
-    errors = (found.error, found.approach_error)
+    errors = (contact.error, contact.approach_error)
     stored = pressure
     if pressure.size >= PACKED_FROM and 2 * int((pressure > 0).sum()) < pressure.size:
         cells = grid.xp.flatnonzero(pressure).astype(np.int32)

@@ -448,11 +448,11 @@ def _prolongation(matrix: sparse.csr_array, cells: Numbers, width: int) -> spars
     block = along // _BLOCK * width + across // _BLOCK
     inside = block[first] == block[second]
     graph = sparse.coo_array((np.ones(inside.sum()), (first[inside], second[inside])), shape=matrix.shape)
-    _, part = sparse.csgraph.connected_components(graph, directed=False)
+    _, component = sparse.csgraph.connected_components(graph, directed=False)
     belongs = np.zeros(cells.size, dtype=bool)
     belongs[first] = belongs[second] = True
     rows = np.flatnonzero(belongs)
-    _, coarse = np.unique(part[rows], return_inverse=True)
+    _, coarse = np.unique(component[rows], return_inverse=True)
     of_coarse = sparse.csr_array((np.ones(rows.size), (rows, coarse)), shape=(cells.size, coarse.max(initial=-1) + 1))
     return of_coarse - sparse.diags_array(_RELAXATION / diagonal) @ matrix @ of_coarse
 
@@ -496,7 +496,7 @@ def frozen_contact(
         return math.inf, 0.0
     present = np.ones(contact.shape, dtype=bool) if present is None else present
     beyond: Any = {"free": "constant", "periodic": "wrap", "mirror": "symmetric"}[boundary]
-    rimmed, rim = (np.pad(one, 1, mode=beyond) for one in (contact, present))
+    rimmed, rim = (np.pad(mask, 1, mode=beyond) for mask in (contact, present))
     if boundary == "free":  # the surface outside the spots has no influence
         [(x, y)] = ndimage.find_objects(contact.astype(np.int8))
         around = slice(x.start, x.stop + 2), slice(y.start, y.stop + 2)
@@ -551,7 +551,7 @@ def _edge_energies(
     pressure : ndarray, shape (nx, ny)
         Pressure of the punch. [-]
     """
-    touching, material = (np.stack([*neighbours(one, "free")]) for one in (contact, rim))
+    touching, material = (np.stack([*neighbours(mask, "free")]) for mask in (contact, rim))
     faces = (contact & ~touching)[:, 1:-1, 1:-1]  # towards each of the four neighbours
     energy = (np.repeat(spacing, 2) * spacing[0] * spacing[1])[:, None, None] * pressure**2
     opens = faces & material[:, 1:-1, 1:-1]

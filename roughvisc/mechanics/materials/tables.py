@@ -560,16 +560,16 @@ def _superposed(known: _Measured, *columns: tuple[float, ...]) -> ThermalLaw:
         one_temperature = known.checked(tuple(column[rows] for column in given), rows)
         parts.append(one_temperature)
         of_parts.append(np.full(one_temperature.columns[0].size, temperatures[rows].mean()))
-    at, *values = (
+    ages, *values = (
         np.concatenate(column) for column in zip(*(one_temperature.columns for one_temperature in parts), strict=True)
     )
     names: tuple[Any, ...] = ("storage", "loss") if known.quantity == "dynamic" else (known.quantity,)
-    later = at > 0  # a row at time zero has no reduced time
+    later = ages > 0  # a row at time zero has no reduced time
     values = [value[later] for value in values]
     is_noisy = known.quantity == "relaxation" and values[0].min() <= 0
     least = known.noise * float(values[0].max()) if is_noisy else 0.0
     rows_of = dict(zip(names, values, strict=True))
-    superposed = superpose(np.concatenate(of_parts)[later], at[later], rows_of, known.vertical, least)
+    superposed = superpose(np.concatenate(of_parts)[later], ages[later], rows_of, known.vertical, least)
     superposed = replace(superposed, bounds=(float(temperatures.min()), float(temperatures.max())), factor=factor)
     reduced, rows_at_reference = superposed.reduced()
     order = np.argsort(reduced, kind="stable")
