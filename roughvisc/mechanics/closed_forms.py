@@ -393,7 +393,7 @@ def lee_radok(sphere_radius: Quantity, material: Material, load: Quantity | Prog
         The half-space.
     load : float or str, or Program
         A load ``W`` that is applied at time zero and kept [N], or rising ramps, holds and jumps of load. A recorded
-        load may fall below its earlier maximum by up to 10 % of its largest value, as noise does in a hold: then the
+        load may fall below its earlier maximum by up to 10 % of its largest value, such as noise in a hold: then the
         running maximum is used, and a warning states the fall.
 
     Returns

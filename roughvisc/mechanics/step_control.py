@@ -1,8 +1,9 @@
 """Lengths of the pairs of steps: the error that a pair adds, and the length of the next pair.
 
 `python workflows/benchmarks/step_constants.py "NAME=VALUE"` shows the effect of a constant. Numbers below are from it,
-unless another command is named: convolutions of plain scenes with 1, 10 and 50 kept times, over those with the
-present value, and rows of cells in contact beyond the tolerance with one kept time, of 300, and with twenty, of 1,000.
+unless another command is named. The first three are convolutions of plain scenes with 1, 10 and 50 kept times, divided
+by the convolutions with the present value. The next two are rows of cells in contact beyond the tolerance: with one
+kept time, of 300, and with twenty, of 1,000.
 """
 
 from __future__ import annotations

@@ -29,8 +29,8 @@ Grid error, measured on discs, squares at any angle, strips and Hertz contacts:
    approach on the same grid. A correction is not needed.
 2. At an edge of the material the outline is known, and the punch is too soft to first order. The problem is solved
    again on cells of half the side, and the stiffness is extrapolated: by twice the difference for an outline along the
-   cells, and by 1.2 times the difference for an oblique outline, whose cells form a staircase around it. The share of
-   faces that belong to steps distinguishes the two.
+   cells, and by 1.2 times the difference for an oblique outline. The cells of an oblique outline form a staircase. The
+   share of faces that belong to steps distinguishes the two.
 
 .. [1] P. Vaněk, J. Mandel, M. Brezina, Algebraic multigrid by smoothed aggregation for second and fourth order elliptic
    problems, Computing 56 (1996) 179-196.

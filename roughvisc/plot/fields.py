@@ -33,9 +33,9 @@ from roughvisc.topography.spectrum import psd
 from roughvisc.units import Quantity, Unit, listed, quantities, unit_for
 from roughvisc.variables import AXES, FIELDS, VARIABLES, axis_of
 
-#: Field -> perceptually even colour map without the colour of contact; reduction of a block of cells to one drawn cell;
-#: colour and name of the values below the scale, which are zero or, for the flux, small. Pressure, gap and flux darken
-#: as they rise.
+#: Field -> perceptually uniform colour map without the colour of contact; reduction of a block of cells to one drawn
+#: cell; colour and name of the values below the scale. These values are zero or, for the flux, small. Pressure, gap and
+#: flux are darker at larger values.
 LOOK = {
     "pressure": ("viridis_r", "max", style.NO_CONTACT, "no contact"),
     "gap": ("cividis_r", "min", style.CONTACT, "contact"),

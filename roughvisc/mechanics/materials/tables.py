@@ -31,8 +31,8 @@ Columns = tuple[Array, ...]
 _OFFERED = (1, 1.5, 2, 3, 4, 6, 12, 24)
 #: A fit with fewer terms may have an rms misfit larger by this factor than the smallest one.
 _FEWER = 1.1
-#: Number of values per decade below which a smooth spectrum is fitted, its terms per decade, and the weight of the
-#: differences between neighbouring terms next to the misfit of the rows.
+#: Number of values per decade below which a smooth spectrum is fitted, and the terms per decade of this spectrum.
+#: Weight of the differences between neighbouring terms, relative to the misfit of the rows.
 _FEW = 2.5
 _SMOOTH = 3
 _STEPS = 0.01
@@ -48,9 +48,9 @@ _CREEP = (10.0, 1e-7)
 #: others, whose largest ratio was 1.02 to 1.06.
 _ONE_TEMPERATURE = 1.1
 _SAME_FREQUENCY = 1e-3
-#: Decades before the first time of a relaxation test that are extrapolated, and scale of these rows over their modulus;
-#: largest time of the rows that are continued, over the first one, their smallest number, and the ratio of the first to
-#: the mean slope from which they are the tail of one process.
+#: Decades before the first time of a relaxation test that are extrapolated, and scale of these rows over their modulus.
+#: Then for the first rows, from which the extrapolation starts: their largest time over the first time, their smallest
+#: number, and the ratio of the first to the mean slope above which they are the tail of one process.
 _EXTRAPOLATED = 1.5
 _BEFORE = 10.0
 _FIRST_ROWS = 4.0
@@ -698,9 +698,9 @@ def _gap(times: Array) -> str:
 def _earlier(times: Array, moduli: Array) -> tuple[Array, Array]:
     """Return times before the first of a relaxation test, ascending [s], and moduli there.
 
-    The modulus goes on as a power of time with the mean slope of the first rows or of the first decade, or flattens
-    towards earlier times as it does in the first rows, whichever rises less. It is not continued if the first rows are
-    the tail of one fast process. A series without these rows ends at a third of the first time: its
+    On logarithmic axes the modulus has the flatter one of two slopes: the mean slope of the first rows or of the first
+    decade, and a slope that flattens towards earlier times like the first rows. It is not continued if the first rows
+    are the tail of one fast process. A series without these rows ends at a third of the first time: its
     compliance there is a quarter too large for a polymer in the glass transition.
     """
     nothing = np.zeros(0)
