@@ -337,8 +337,10 @@ def layer_series(body: LayeredBody, shortest: float, duration: float, tolerance:
         course = crept(fitted.times, t)
         of_waves = (fitted.compliances, exact), (interpolated(between, q, fitted.compliances), expected)
         error = max(
-            float((np.abs((course @ one).T / known - 1) * np.minimum(known / (_STIFF * known.max()), 1.0)).max())
-            for one, known in of_waves
+            float(
+                (np.abs((course @ compliances).T / known - 1) * np.minimum(known / (_STIFF * known.max()), 1.0)).max()
+            )
+            for compliances, known in of_waves
         )
         best = replace(fitted, error=error) if error < best.error else best
         if error <= tolerance:

@@ -106,9 +106,9 @@ class Difference:
             shared=self.shared + left * former.shared,
         )
 
-    def or_larger(self, other: Difference, part: float = 1.0) -> Difference:
-        """Return the larger error of each kind, of this one and a part of the other."""
-        larger = np.maximum(list(vars(self).values()), part * np.array(list(vars(other).values())))
+    def or_larger(self, other: Difference, factor: float = 1.0) -> Difference:
+        """Return the larger error of each kind, of this one and the other one times a factor."""
+        larger = np.maximum(list(vars(self).values()), factor * np.array(list(vars(other).values())))
         return Difference(*larger.tolist())
 
 

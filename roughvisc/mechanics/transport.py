@@ -258,10 +258,10 @@ def _conductances(mobility: Array, aspect: float, wrap: bool) -> Array:
         cell to its neighbour at larger y; the face of the last column joins the borders or is closed.
     """
 
-    def in_series(one: Array, other: Array) -> Array:
+    def in_series(first: Array, second: Array) -> Array:
         # no product, which may underflow
-        low = np.minimum(one, other)
-        high = np.maximum(one, other)
+        low = np.minimum(first, second)
+        high = np.maximum(first, second)
         return 2 * low / (1 + np.divide(low, high, where=high > 0, out=np.zeros_like(low)))
 
     along = np.concatenate([2 * mobility[:1], in_series(mobility[:-1], mobility[1:]), 2 * mobility[-1:]])
