@@ -175,7 +175,7 @@ SEEN = {
     ),
     "creeping_seal-leakage": (
         "Four maps of the flow around the contact spots at 1 ms, 200 ms, 30 s and 40 s; at 40 s there is none",
-        "Dark bands carry the flow from left to right. At 30 s one constriction, near the middle, carries all of it. "
+        "Dark bands carry the flow from left to right. At 30 s one constriction, near the middle, carries the whole flow. "
         "At 40 s it is closed, although more than half of the area is not in contact.",
     ),
     "friction-curve": (

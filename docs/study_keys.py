@@ -35,7 +35,7 @@ _FILE = {
 }
 _RECIPE = ("", "required", "the recipe: " + ", ".join(f"`{name}`" for name in RECIPES))
 _MODEL = ("", "required", "the model: " + ", ".join(f"`{name}`" for name in MODELS))
-_CONTROL = ("", "`load`", "what the values are: `load`, `approach` or `pressure`")
+_CONTROL = ("", "`load`", "quantity of the values: `load`, `approach` or `pressure`")
 _EXTRA = {
     "study": {
         "title": ("", "`untitled`", "title of the study and its figures"),
@@ -45,7 +45,7 @@ _EXTRA = {
         "program": ("", "none", "list of segments; this or `friction` is required"),
         "friction": ("", "none", "steady sliding"),
         "solve": ("", "none", "how it is computed"),
-        "keep": ("", "none", "what the result keeps"),
+        "keep": ("", "none", "quantities in the result"),
         "observe": ("", "none", "quantities derived from the result"),
         "audit": ("", "none", "properties for the audit"),
         "sweep": ("", "none", "values that are varied"),

@@ -104,7 +104,7 @@ def sign_of_life(what: str) -> Iterator[None]:
     Parameters
     ----------
     what : str
-        What it does, as in ``"reads the scan"``.
+        Activity, such as ``"reads the scan"``.
     """
     status = Console(stderr=True).status(f"{what} ...")
     timer = threading.Timer(1.0, status.start)

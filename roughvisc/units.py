@@ -179,7 +179,7 @@ def listed(value: Any, unit: str, key: str, otherwise: str = "") -> NDArray[np.f
     key : str
         Name of the list in messages.
     otherwise : str
-        What a bare whole number means, for the message.
+        Meaning of a bare whole number, for the message.
 
     Raises
     ------

@@ -291,7 +291,7 @@ VARIABLES: dict[str, Variable] = {
         _SERIES,
         "1",
         "grid error of the mean contact pressure",
-        f"from those of force and area; {_COARSER}",
+        f"from the errors of force and area; {_COARSER}",
         missing=f"{_NO_ESTIMATE}, or the area may be zero",
         table="largest",
     ),

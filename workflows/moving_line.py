@@ -66,11 +66,11 @@ def theory(speed, *, recedes):
 
     The line is a crack with a cohesive zone of the strength of the attraction. The zone has the length
     ``d = pi G E / 4 strength^2`` and passes in the time ``d / 3 v``, in which the creep compliance grows to ``C``. An
-    opening crack needs ``G C = w C(infinity)`` [1]. The zone of a closing crack is the same, but the stress far from it
-    acts on the compliance of the zone: ``G C(infinity) = w C`` [2].
+    opening crack needs ``G C = w C(infinity)`` [1]. The formula of the closing crack is our derivation, after
+    Schapery's: its zone is the same, but the stress far from it acts on the compliance of the zone, so that
+    ``G C(infinity) = w C``.
 
     .. [1] R. A. Schapery, Int. J. Fract. 11 (1975) 369; J. A. Greenwood, J. Phys. D 37 (2004) 2557.
-    .. [2] E. Barthel, C. Fretigny, J. Phys. D 42 (2009) 195302.
     """
     low, high = 1.0, 1 / GLASSY
     for _ in range(60):

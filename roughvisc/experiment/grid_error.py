@@ -341,7 +341,7 @@ def counting_error(contact: Mask, faces: int) -> float:
 def _edge(contact: Mask, present: Mask, boundary: Boundary) -> tuple[Mask, Mask, int, int, int]:
     """Return the contact cells at the edge of the contact and at the edge of the material, and numbers of faces.
 
-    The faces are those to free cells, those at the edge of the material, and those of the last to absent cells. The
+    The faces are faces to free cells, faces at the edge of the material, and faces of the last to absent cells. The
     others lie at the border of the grid, whose place is known.
     """
     at_edge = np.zeros_like(contact)

@@ -474,8 +474,8 @@ class LoadingRows(Rows):
 def jump_ratio(attracts: Adhesion, body: Body, sides: tuple[float, float], age: float) -> float:
     r"""Return the ratio from which single cells may jump into and out of contact.
 
-    A cell that is pulled by the tension has two stable states if the tension falls faster with the gap than the cell
-    springs back: if :math:`C w K_0 / \rho^2 > 1`, with the contact compliance :math:`C`, the work of adhesion
+    A cell under tension has two stable states if the tension decreases faster with the gap than the elastic restoring
+    pressure. The condition is :math:`C w K_0 / \rho^2 > 1`, with the contact compliance :math:`C`, the work of adhesion
     :math:`w`, its range :math:`\rho`, and the displacement :math:`K_0` of a cell under unit pressure on it.
 
     Parameters

@@ -85,9 +85,9 @@ _TRANSFORMS = {"periodic": 1.5, "mirror": 1.5, "free": 6.0}
 _WHOLE = 6.0
 #: Memory of the transforms over these fields: cuFFT also has work areas (not measured).
 _PLANS = {"cpu": 1.0, "gpu": 3.0}
-#: Number of solutions (pressure and displacement) and number of copies of each exponential at the peak. First without
-#: memory; then for a pair of steps with its coarse solution and first guesses; last for a pair of soft steps, with the
-#: ends of its steps and the exponentials of the step before.
+#: Number of solutions (pressure and displacement) and number of copies of each exponential at the peak. The first row
+#: is without memory. The second is for a pair of steps with its coarse solution and first guesses. The third is for a
+#: pair of soft steps, with the ends of its steps and the exponentials of the step before.
 _ELASTIC = (2, 0)
 _PAIR = (5, 5)
 _SOFT_PAIR = (7, 9)

@@ -38,11 +38,12 @@ MARGIN = 1.2
 BEYOND = 1.05
 #: Cells around the domain.
 RIM = 1
-#: Least number of cells along the shorter side for which a smaller domain pays, and its largest part of all cells.
+#: Least number of cells along the shorter side for which a smaller domain saves time, and its largest part of the
+#: cells.
 WORTH_CROPPING = 48
 LARGEST_PART = 0.8
-#: Factor by which the surface of an indenter grows; and, after contact has outgrown its domain, the factor of the
-#: estimated approach, or of the size of an indenter's contact, for which the next domain is chosen.
+#: Factor by which the surface of an indenter grows. After contact has outgrown its domain, also the factor on the
+#: estimated approach, or on the size of an indenter's contact, for the next domain.
 GROWTH = 1.5
 
 

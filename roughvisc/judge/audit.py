@@ -443,7 +443,7 @@ _TABLE = (
     Limit(slope, 0.3, 1, "true area 4.5 % larger than projected; 50 % larger: Johnson (1985), section 4.1"),
     Limit(inertia, 0.1, 1, "10 % off the quasi-static value; 100 % off: Lysmer, Richart (1966); Cole, Huth (1958)"),
     Limit(heating, 1, 10, "retardation times a fifth shorter; six times shorter: Williams, Landel, Ferry (1955)"),
-    Limit(resolution, 0.1, 0.5, "10 % of the area; half of it, and as much again for the next octave: Persson (2001)"),
+    Limit(resolution, 0.1, 0.5, "10 % of the area; half of the area, also in the next octave: Persson (2001)"),
     Limit(border, 2, 10, "a step is visible; on 100 rows the seam has as much mean square slope as all other rows"),
 )
 #: Name of an assumption -> its limits.

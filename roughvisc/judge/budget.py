@@ -329,7 +329,7 @@ def coarser_grids(base: Case, height: xr.DataArray, coarsening: float) -> tuple[
 def finer_grid(base: Case, height: xr.DataArray, coarsening: float) -> tuple[Neighbour, ...]:
     """Return a case with adhesion on its own cells, against cells half as long.
 
-    Longer cells may not resolve the range of the attraction. The parameters are those of :func:`coarser_grids`.
+    Longer cells may not resolve the range of the attraction. Parameters as in :func:`coarser_grids`.
     """
     own, fine = (on_cells(base, height, part * coarsening) for part in (1.0, 0.5))
     return (Neighbour(own, GRID_SAFETY, fine, 1.0),)
@@ -403,7 +403,7 @@ def sources_of(
         (MODULUS, "modulus_error", "moduli", stiffer),
         (TIME_SCALE, "time_scale_error", "times of the material", slower),
     ]
-    if attracts is not None:  # less work and a longer range need no shorter cells
+    if attracts is not None:  # less work or a longer range does not require shorter cells
         work = attracts.work
         reach = attracts.range
         of_work = {"adhesion.work": work / _CHANGE, "adhesion.range": reach, "adhesion.strength": None}

@@ -66,8 +66,8 @@ _CURVE_GROWS = 0.15
 #: Largest numbers of convolutions and steps of a coarse run. A time limit would depend on the load of the machine.
 _MOST_CONVOLUTIONS = 2500
 _MOST_STEPS = 500
-#: Part of a program below which a run is repeated with a looser tolerance: the steps of the first contact tell nothing
-#: about later ones. Factor of the tolerance, its largest value, and the exponent of the tolerance in the number of
+#: Part of a program below which a run is repeated with a looser tolerance: the steps of the first contact do not
+#: predict later ones. Factor of the tolerance, its largest value, and the exponent of the tolerance in the number of
 #: steps (0.45 to 0.53 on a polymer with 18 exponentials, 1e-3 to 1e-1).
 _LITTLE = 0.2
 _LOOSER = 100.0

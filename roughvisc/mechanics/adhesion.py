@@ -84,8 +84,8 @@ def adhesion(
     2e-08
     """
     if (range is None) == (strength is None):
-        found = "neither" if range is None else "both"
-        raise InputError(key="range", found=found, expected="either a range [m] or a strength [Pa]")
+        given = "neither" if range is None else "both"
+        raise InputError(key="range", found=given, expected="either a range [m] or a strength [Pa]")
     if range is None:
         if work == 0:
             raise InputError(key="work", found=work, expected="a work above 0, or a range instead of the strength")

@@ -227,7 +227,7 @@ def periodic_symbol(
     spacing : tuple of float
         Cell sides. [m]
     is_whole : bool
-        Whether the kernel is that of the body, and not of a part of its response, which may vanish.
+        Whether the kernel belongs to the whole body, and not to a part of its response, which may vanish.
 
     Returns
     -------

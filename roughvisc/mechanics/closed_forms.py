@@ -393,7 +393,7 @@ def lee_radok(sphere_radius: Quantity, material: Material, load: Quantity | Prog
         The half-space.
     load : float or str, or Program
         A load ``W`` that is applied at time zero and kept [N], or rising ramps, holds and jumps of load. A recorded
-        load may fall below its earlier maximum by up to 10 % of its largest value, as noise does in a hold: then the
+        load may fall below its earlier maximum by up to 10 % of its largest value, such as noise in a hold: then the
         running maximum is used, and a warning states the fall.
 
     Returns
@@ -428,7 +428,7 @@ def lee_radok(sphere_radius: Quantity, material: Material, load: Quantity | Prog
     """
     if not isinstance(load, Program):
         load = Program().load(number(load, "N", "load", above=0), over=0)
-    if not all(one.control == "load" and not (one.amplitude or one.slide) for one in load.segments):
+    if not all(segment.control == "load" and not (segment.amplitude or segment.slide) for segment in load.segments):
         raise InputError(key="load", found=load, expected="a load, without approaches, pressures, cycles and slides")
     return GrowingContact(sphere_radius, material, _rising(load))
 

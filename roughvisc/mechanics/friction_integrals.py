@@ -99,7 +99,7 @@ class DirectionMeans:
         return np.exp(square), np.where(loss > _NO_LOSS, np.exp(loss), 0.0)
 
     def _tabulate(self, low: float, high: float) -> None:
-        """Tabulate the means for natural logarithms of the frequency in a range, with what is known already."""
+        """Tabulate the means for natural logarithms of the frequency in a range; keep the existing table."""
         if self._range[0] < math.inf:
             low = self._range[0] if low >= self._range[0] else low - _GROWS
             high = self._range[1] if high <= self._range[1] else high + _GROWS
@@ -223,7 +223,7 @@ class FrictionIntegrals:
 
         def hotter(rise: Array) -> tuple[Array, SlidingWaves]:
             friction, contact = self._friction(speed, heating.shift_factor(rise))
-            # half of the heat between two wave numbers belongs to each of them
+            # each wave number has half of the heat of the interval to its neighbour
             heat = (np.append(friction, 0.0) + np.append(0.0, friction)) / 2 * self._pressure * speed
             in_spots = np.interp(math.log(math.pi / radius), np.log(self._q), contact)
             return spot.rise(heat / in_spots), SlidingWaves(friction, contact, rise, float(heat.sum()))

@@ -34,7 +34,7 @@ Array = Any  # an array of NumPy or CuPy
 Boundary = Literal["free", "periodic", "mirror"]
 
 #: Number of rows in a block of rows; bytes of a block of columns, and its least number of columns. A block is
-#: transformed at once and fits in the cache: whole fields take up to 1.5 times as long (measured, 64 to 1,024 squared).
+#: transformed in one call and fits in the cache: whole fields take up to 1.5 times as long (64 to 1,024 squared).
 ROWS = 128
 COLUMN_BYTES = 1 << 18
 COLUMNS = 32
@@ -164,7 +164,7 @@ class Grid:
         self.symbol = xp.asarray(self.symbol_of(kernel) if symbol is None else symbol)
         self.definite = boundary == "free" or float(self.symbol[0, 0]) > 0
         self.largest_eigenvalue = float(self.symbol.max()) or spacing[0]
-        number = np.arange(self.symbol.shape[1])  # of the wave along y, which stands for the negative number too
+        number = np.arange(self.symbol.shape[1])  # of the wave along y; also counts the negative number
         twice = (boundary != "mirror") & (number > 0) & (2 * number < self.points[1])
         self.self_influence = float((self.symbol.sum(axis=0) * xp.asarray(1.0 + twice)).sum()) / math.prod(self.points)
         self.convolutions = 0
@@ -270,32 +270,32 @@ class Grid:
         if self._work is None:
             self._work = self.xp.empty(nx * (self.points[1] // 2 + 1), np.complex128)
         spectrum = self._work.view(np.result_type(field.dtype, np.complex64))[: nx * count].reshape(nx, count)
-        found = self.xp.empty((nx, ny), field.dtype)
+        convolved = self.xp.empty((nx, ny), field.dtype)
         rows = ROWS
         columns = max(COLUMN_BYTES // (points[0] * spectrum.itemsize), COLUMNS)
         if self.xp is not np:
             rows = nx
             columns = count
 
-        def transform_rows(part: slice) -> None:
-            spectrum[part] = fft.waves(field[part], points[1:], axes=(1,))
+        def transform_rows(block: slice) -> None:
+            spectrum[block] = fft.waves(field[block], points[1:], axes=(1,))
 
-        def convolve_columns(part: slice) -> None:
-            waves = self.xp.empty((points[0], spectrum[:1, part].size), spectrum.dtype)
-            waves[:nx] = spectrum[:, part]
+        def convolve_columns(block: slice) -> None:
+            waves = self.xp.empty((points[0], spectrum[:1, block].size), spectrum.dtype)
+            waves[:nx] = spectrum[:, block]
             waves[nx:] = 0
             waves = fft.columns(waves)
-            waves *= symbol[:, part]
-            spectrum[:, part] = fft.columns(waves, back=True)[:nx]
+            waves *= symbol[:, block]
+            spectrum[:, block] = fft.columns(waves, back=True)[:nx]
 
-        def rows_back(part: slice) -> None:
-            found[part] = fft.waves_back(spectrum[part], points[1:], axes=(1,))[:, :ny]
+        def rows_back(block: slice) -> None:
+            convolved[block] = fft.waves_back(spectrum[block], points[1:], axes=(1,))[:, :ny]
 
         run = map if threads == 1 else _pool(threads).map
         for work, total, width in (transform_rows, nx, rows), (convolve_columns, count, columns), (rows_back, nx, rows):
-            parts = map(slice, range(0, total, width), range(width, total + width, width))
-            list(run(work, parts))  # waits for all parts, and raises an error of a part again
-        return found
+            blocks = map(slice, range(0, total, width), range(width, total + width, width))
+            list(run(work, blocks))  # waits for all blocks, and raises an error of a block again
+        return convolved
 
     # ----------------------------------------------------------------------------------------------------- transforms
 
@@ -311,8 +311,8 @@ class Grid:
         """Return the field of a transform, which is overwritten."""
         if self.boundary == "mirror":
             return self._transforms.cosines_back(spectrum)
-        found = self._transforms.waves_back(spectrum, self.points)
-        return self.xp.ascontiguousarray(found[: self.shape[0], : self.shape[1]])
+        field = self._transforms.waves_back(spectrum, self.points)
+        return self.xp.ascontiguousarray(field[: self.shape[0], : self.shape[1]])
 
     def filtered(self, field: Array, factors: Array) -> Array:
         """Return a field on all points of the transforms, each wave multiplied by a factor: one convolution."""
@@ -428,9 +428,9 @@ def convolved_by_cufft(fft: Any, field: Array, symbol: Array) -> Array:
     spectrum = forward.get_output_array(field)
     forward.fft(field, spectrum, _FORWARD)
     spectrum *= symbol
-    found = back.get_output_array(spectrum)
-    back.fft(spectrum, found, _BACK)  # overwrites the spectrum
-    return found
+    convolved = back.get_output_array(spectrum)
+    back.fft(spectrum, convolved, _BACK)  # overwrites the spectrum
+    return convolved
 
 
 #: Directions of cuFFT.

@@ -17,8 +17,8 @@ _M_MMAP_THRESHOLD = -3
 def keep_freed_memory() -> None:
     """Let glibc reuse the memory of freed fields instead of mapping new memory for each.
 
-    By default, and more so with what Dask sets for its workers, fields are mapped anew each time: a worker then spends
-    half as much time in the system as in the computation. Other C libraries keep their settings.
+    By default, each field gets newly mapped memory, more often with Dask's settings for its workers. A worker then
+    spends half as much time in the system as in the computation. Other C libraries keep their settings.
     """
     with suppress(OSError, AttributeError, TypeError):
         library = ctypes.CDLL(None)

@@ -41,7 +41,7 @@ Array = NDArray[np.float64]
 _OSCILLATES = 60.0
 _LEAST = 1e-9
 _MOST = 1e12
-# Points per panel of this integral, and panels per decade where nothing oscillates.
+# Points per panel of this integral, and panels per decade below the oscillations.
 _POINTS = 4
 _PER_DECADE = 1.5
 # Step of the logarithm of k, and margin of k beyond the wave numbers of source, depth and spot. The integrand is
@@ -66,7 +66,7 @@ class Heating:
     Parameters
     ----------
     shift : callable
-        ``shift(T)`` returns the shift factor ``a_T`` at a temperature [K], relative to the material as it is given:
+        ``shift(T)`` returns the shift factor ``a_T`` at a temperature [K], relative to the given material:
         such as ``lambda T: rv.wlf(T, "20 degC", 8.86, 101.6)`` for a material measured at 20 degC.
     temperature : float or str
         Temperature of the body far from the contact. [K]
@@ -78,8 +78,7 @@ class Heating:
         [W/(m K)]
     spot_radius : float or str, optional
         Radius of the spots that the long waves of a surface leave in contact, such as the summits of the grains of a
-        road, for :func:`roughvisc.friction_theory`. :func:`roughvisc.friction` takes the mean radius of its own spots.
-        [m]
+        road, for :func:`roughvisc.friction_theory`. [m] :func:`roughvisc.friction` computes the mean radius itself.
 
     Raises
     ------

@@ -105,9 +105,9 @@ def effective_compliance(
     q = np.asarray(q, dtype=float)
     shape = np.broadcast_shapes(q.shape, *(np.shape(compliance) for compliance in shear_compliances))
     if math.prod(shape) > _WAVES_TOGETHER and shape[0] > 1:
-        halves = (np.array_split(np.broadcast_to(one, shape), 2) for one in (q, *shear_compliances))
+        halves = (np.array_split(np.broadcast_to(factor, shape), 2) for factor in (q, *shear_compliances))
         parts = zip(*halves, strict=True)
-        return np.concatenate([effective_compliance(one, thicknesses, poissons, rest) for one, *rest in parts])
+        return np.concatenate([effective_compliance(waves, thicknesses, poissons, rest) for waves, *rest in parts])
     layers = [np.asarray(compliance)[..., None, None] for compliance in shear_compliances]
     down, down_stress, _, _ = _partial_waves(poissons[-1])
     # displacements over tractions, the tractions over 2 q
@@ -328,7 +328,7 @@ def layer_series(body: LayeredBody, shortest: float, duration: float, tolerance:
         return best
     for per_decade in _OFFERED:
         times = body.times(first, last, per_decade)
-        if last in times or any(one.fluidity > 0 for one in body.materials):
+        if last in times or any(material.fluidity > 0 for material in body.materials):
             times = np.append(times, math.inf)
         terms = crept(times, t)[:, :-1]
         weights = np.array([nonnegative(terms, row - zero, row) for zero, row in zip(at_once, exact, strict=True)])
@@ -337,8 +337,10 @@ def layer_series(body: LayeredBody, shortest: float, duration: float, tolerance:
         course = crept(fitted.times, t)
         of_waves = (fitted.compliances, exact), (interpolated(between, q, fitted.compliances), expected)
         error = max(
-            float((np.abs((course @ one).T / known - 1) * np.minimum(known / (_STIFF * known.max()), 1.0)).max())
-            for one, known in of_waves
+            float(
+                (np.abs((course @ compliances).T / known - 1) * np.minimum(known / (_STIFF * known.max()), 1.0)).max()
+            )
+            for compliances, known in of_waves
         )
         best = replace(fitted, error=error) if error < best.error else best
         if error <= tolerance:
@@ -403,14 +405,16 @@ class LayeredBody(Body):
     @property
     def poissons(self) -> tuple[float, ...]:
         """Poisson's ratios from the top."""
-        return tuple(one.poisson for one in self.materials)
+        return tuple(material.poisson for material in self.materials)
 
     @property
     def separates(self) -> bool:
         """Whether space and time separate: the compliances of all materials have the same ratios at all times."""
-        if not all(isinstance(one, Prony) and one.times == self.materials[0].times for one in self.materials):
-            return all(one == self.material for one in self.below)
-        terms = np.array([[one.glassy, one.fluidity, *one.compliances] for one in self.materials])
+        if not all(
+            isinstance(material, Prony) and material.times == self.materials[0].times for material in self.materials
+        ):
+            return all(material == self.material for material in self.below)
+        terms = np.array([[material.glassy, material.fluidity, *material.compliances] for material in self.materials])
         shares = terms / terms.sum(axis=1, keepdims=True)
         return bool(np.all(np.abs(shares - shares[0]) <= 1e-12 * shares[0].max()))  # up to rounding
 
@@ -421,13 +425,13 @@ class LayeredBody(Body):
 
     def over_frequencies(self, frequency: ArrayLike, tolerance: float) -> LayeredBody:
         """Return the body with materials that represent its own at some frequencies. [1/s]"""
-        return self.of(over_frequencies(one, frequency, tolerance) for one in self.materials)
+        return self.of(over_frequencies(material, frequency, tolerance) for material in self.materials)
 
     def waves(self, qx: Array, qy: Array, frequency: Array) -> tuple[Array, NDArray[np.complex128]]:
         """Return the kernel of a half-space [m], and the effective contact compliance of each wave. [1/Pa]"""
         q = np.hypot(qx, qy)
         with np.errstate(divide="ignore", invalid="ignore"):  # at zero frequency
-            shear = np.array([one.laplace(1j * frequency) for one in self.materials])
+            shear = np.array([material.laplace(1j * frequency) for material in self.materials])
         flows = ~np.isfinite(shear).all(axis=0)
         shear[:, flows] = 1.0
         compliance = effective_compliance(np.where(q > 0, q, 1.0), self.thicknesses, self.poissons, list(shear))
@@ -435,7 +439,7 @@ class LayeredBody(Body):
 
     def at_once(self, q: Array) -> Array:
         """Return the instantaneous effective contact compliance of waves. [1/Pa]"""
-        shear = [one.glassy for one in self.materials]
+        shear = [material.glassy for material in self.materials]
         count = shear.index(0) if 0 in shear else len(self.thicknesses)  # nothing below a rigid material moves
         return effective_compliance(q, self.thicknesses[:count], self.poissons[: count + 1], shear[: count + 1])
 
@@ -457,7 +461,7 @@ class LayeredBody(Body):
         z = count * (-0.4814 + 0.6122 * angle * cotangent + 0.2645j * angle)
         slope = 0.6122 * cotangent - 0.6122 * 0.6407 * angle / sine**2 + 0.2645j
         weights = 2 * np.exp(z) * slope / z
-        shear = [one.laplace(z / t[:, None]) for one in self.materials]
+        shear = [material.laplace(z / t[:, None]) for material in self.materials]
         compliance = effective_compliance(q[:, None, None], self.thicknesses, self.poissons, shear)
         return np.asarray((compliance @ weights).imag)
 
@@ -469,11 +473,11 @@ class LayeredBody(Body):
         """
         place = lattice(shortest, longest, 100)
         with np.errstate(divide="ignore"):  # at a retardation time of the material
-            signs = np.sign([one.laplace(-1 / place) for one in self.materials])
+            signs = np.sign([material.laplace(-1 / place) for material in self.materials])
         apart = scipy.ndimage.binary_dilation((signs != signs[0]).any(axis=0))
-        offered = {min(max(time, shortest), longest) for one in self.materials for time in one.times}
-        for (part,) in scipy.ndimage.find_objects(scipy.ndimage.label(apart)[0]):
-            first, *_, end = place[part]
+        offered = {min(max(time, shortest), longest) for material in self.materials for time in material.times}
+        for (stretch,) in scipy.ndimage.find_objects(scipy.ndimage.label(apart)[0]):
+            first, *_, end = place[stretch]
             offered.update(lattice(first, end, per_decade).tolist())
         return np.array(sorted(offered))
 
@@ -537,8 +541,8 @@ def layer(material: Material, thickness: Quantity, *, on: Any) -> Body:
     thicknesses = (number(thickness, "m", "thickness", above=0), *getattr(on, "thicknesses", ()))
     body = LayeredBody(material, below=below, thicknesses=thicknesses)
     # the kernel is of one age, at which all compliances are known, positive and finite, per unit of the top
-    age = min([1.0, *(one.longest for one in body.materials if isinstance(one, Prony))])
-    shear = [float(one.contact_compliance(age)) * 2 / (1 - one.poisson) for one in body.materials]
+    age = min([1.0, *(material.longest for material in body.materials if isinstance(material, Prony))])
+    shear = [float(material.contact_compliance(age)) * 2 / (1 - material.poisson) for material in body.materials]
     unit = 0.5 * (1 - material.poisson) * shear[0]
-    elastic = body.of(Prony(one / unit, poisson=nu) for one, nu in zip(shear, body.poissons, strict=True))
+    elastic = body.of(Prony(compliance / unit, poisson=nu) for compliance, nu in zip(shear, body.poissons, strict=True))
     return replace(body, kernel=layer_series(elastic, 0.0, 0.0, 1e-6).kernel(np.ones(1)))

@@ -234,9 +234,9 @@ class Memory:
         """
         total = self.weights[-1] * history.fields
         parts = np.broadcast_to(left, self.times.shape)
-        for weight, part, mode in zip(self.weights[:-1], parts, history.modes, strict=True):
-            if part:
-                total += weight * (mode if part == 1 else part * mode)
+        for weight, remaining, mode in zip(self.weights[:-1], parts, history.modes, strict=True):
+            if remaining:
+                total += weight * (mode if remaining == 1 else remaining * mode)
         return total
 
     def after_rest(self, history: History, time: float) -> Array:
@@ -371,7 +371,9 @@ class LayerMemory(Memory):
         if grid is not None:
             #: Symbol of each exponential [m/Pa], of the fluidity [m/(Pa s)], and of the instantaneous response. [m/Pa]
             alone = np.eye(len(waves.compliances))
-            self.weights = [grid.xp.asarray(grid.symbol_of(waves.kernel(one), is_whole=False)) for one in alone]
+            self.weights = [
+                grid.xp.asarray(grid.symbol_of(waves.kernel(compliances), is_whole=False)) for compliances in alone
+            ]
 
     def start(self, nothing: Array) -> History:
         """Return the memory of a body at rest, from an array of zeros, shape (nx, ny)."""
@@ -379,13 +381,15 @@ class LayerMemory(Memory):
 
     def predict(self, history: History, step: float, rule: Rule | None = None) -> Prediction:
         """Return the elastic problem of a step [s], with its kernel; its compliance is one, or zero if it is rigid."""
-        found = super().predict(history, step, rule)
+        prediction = super().predict(history, step, rule)
         (*symbols, at_once) = self.weights
-        symbol = sum((part * one for part, one in zip(found.new, symbols, strict=True) if part), at_once)
+        symbol = sum((factor * mode for factor, mode in zip(prediction.new, symbols, strict=True) if factor), at_once)
         cells = self.grid
-        kernel = self.waves.kernel(np.append(found.new, 1.0))
+        kernel = self.waves.kernel(np.append(prediction.new, 1.0))
         grid = Grid(cells.shape, cells.spacing, cells.boundary, kernel=kernel, symbol=symbol, xp=cells.xp)
-        return replace(found, compliance=float(symbol.any()), carried=cells.field_of(found.carried), grid=grid)
+        return replace(
+            prediction, compliance=float(symbol.any()), carried=cells.field_of(prediction.carried), grid=grid
+        )
 
     def advance(self, history: History, prediction: Prediction, unit: Array, pressure: Array) -> History:
         """Return the memory after a step, from the pressure at its end."""
@@ -434,15 +438,15 @@ def choose_memory(
     if isinstance(body, LayeredBody) and not body.separates:
         memory: Memory = _of_layers(body, duration, share, shortest, grid)
     else:
-        found, error = _series(body.material, shortest, duration, share)
-        memory = Memory(found, duration, keeps_pressure)
+        fitted, error = _series(body.material, shortest, duration, share)
+        memory = Memory(fitted, duration, keeps_pressure)
         memory.series_error = error
         memory.misfit = body.material.misfit * (duration > 0)
         if error > 0 and duration > 0:
             memory.shortest = shortest
             known = getattr(body.material, "replaces", None)
             exact = body.material.creep_compliance
-            memory.early = known.early if known else early_error(exact, found.creep_compliance, shortest)
+            memory.early = known.early if known else early_error(exact, fitted.creep_compliance, shortest)
         within = f" in place of the compliance, within {error:.1e} of it at time zero and from {shortest:.1g} s"
         memory.note = "; ".join(filter(None, (memory.note + within * bool(error), body.material.note)))
     if memory.series_error > tolerance:
@@ -465,26 +469,28 @@ def early_error(exact: Callable[[Any], Any], series: Callable[[Any], Any], short
     series. Both functions return compliances of ages, the last axis; the result is the largest of all.
     """
     ages = shortest * np.geomspace(1e-8, 1.0, 400)
-    found = series(ages)
-    deviation = np.trapezoid(abs(found - exact(ages)) * ages, np.log(ages))
-    return float(np.max(deviation / np.trapezoid(found * ages, np.log(ages))))
+    compliance = series(ages)
+    deviation = np.trapezoid(abs(compliance - exact(ages)) * ages, np.log(ages))
+    return float(np.max(deviation / np.trapezoid(compliance * ages, np.log(ages))))
 
 
 def _of_layers(body: LayeredBody, duration: float, share: float, shortest: float, grid: Any) -> Memory:
     """Return the memory of a layered body: exponentials that all waves share."""
     given = body.materials
-    found, errors = zip(*(_series(one, shortest, duration, MATERIALS_SHARE * share) for one in given), strict=True)
-    # the series of the waves need not be much more accurate than those of the materials
-    waves = layer_series(body.of(found), shortest, duration, max(share - max(errors), SERIES_SHARE * max(errors)))
+    fitted, errors = zip(
+        *(_series(material, shortest, duration, MATERIALS_SHARE * share) for material in given), strict=True
+    )
+    # the series of the waves need not be much more accurate than the series of the materials
+    waves = layer_series(body.of(fitted), shortest, duration, max(share - max(errors), SERIES_SHARE * max(errors)))
     memory = LayerMemory(waves, duration, grid)
     memory.series_error = waves.error + max(errors)
-    memory.misfit = max(one.misfit for one in given)
+    memory.misfit = max(material.misfit for material in given)
     if duration > 0:
         memory.shortest = shortest
-        pairs = zip(given, found, errors, strict=True)
+        pairs = zip(given, fitted, errors, strict=True)
         of_materials = (early_error(a.creep_compliance, b.creep_compliance, shortest) for a, b, error in pairs if error)
         few = waves.q[:: max(waves.q.size // 20, 1)]
-        bodies = body.of(found)
+        bodies = body.of(fitted)
         course = interpolated(few, waves.q, waves.compliances)
         of_waves = early_error(lambda t: bodies.creep(few, t), lambda t: (crept(waves.times, t) @ course).T, shortest)
         memory.early = max(of_materials, default=0.0) + of_waves
@@ -492,7 +498,7 @@ def _of_layers(body: LayeredBody, duration: float, share: float, shortest: float
     if waves.times:
         within = f"within {memory.series_error:.1e} of these from {shortest:.1g} s on"
         note = f"{memory.note} that all waves share, each with compliances of its own, {within}"
-    memory.note = "; ".join(filter(None, (note, *(one.note for one in given))))
+    memory.note = "; ".join(filter(None, (note, *(material.note for material in given))))
     return memory
 
 

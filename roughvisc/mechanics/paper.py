@@ -72,9 +72,9 @@ def press(
         past = -at_once * grid.displacement(pressure)
         for began, increment in zip(times, increments, strict=False):
             past += grid.displacement(compliance(time - began) * increment)
-        found, approach, _ = conjugate_gradients(grid, gap + past, at_once, load(time), epsilon=epsilon)
-        increments.append(found - pressure)
-        pressure = found
+        solution, approach, _ = conjugate_gradients(grid, gap + past, at_once, load(time), epsilon=epsilon)
+        increments.append(solution - pressure)
+        pressure = solution
         yield time, pressure, approach
 
 

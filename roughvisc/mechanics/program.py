@@ -229,7 +229,7 @@ class Program:
         return self + Program((Segment(control, number(over, "s", "over", least=0), end),))
 
     def __add__(self, other: Program) -> Program:
-        """Return this program followed by another one, whose first ramp begins where this program ends."""
+        """Return this program followed by another one, whose first ramp begins at the last value of this program."""
         return Program(self.segments + other.segments, " ".join(filter(None, (self.note, other.note))))
 
     def load(self, value: float | str, *, over: float | str) -> Program:
@@ -489,17 +489,26 @@ class Program:
         """
         size = number(area, "m^2", "area", above=0)
         segments = []
-        for one in self.segments:
-            if one.control == "pressure":
-                end = None if one.end is None else float(f"{one.end * size:.15g}")
-                one = replace(one, control="load", end=end, amplitude=float(f"{one.amplitude * size:.15g}"))
-            segments.append(one)
+        for segment in self.segments:
+            if segment.control == "pressure":
+                end = None if segment.end is None else float(f"{segment.end * size:.15g}")
+                segment = replace(segment, control="load", end=end, amplitude=float(f"{segment.amplitude * size:.15g}"))
+            segments.append(segment)
         return self if tuple(segments) == self.segments else replace(self, segments=tuple(segments))
 
     @cached_property
     def lowest_load(self) -> float:
         """Lowest load [N] or nominal pressure [Pa] prescribed anywhere, at most zero."""
-        return min([0.0, *((one.end or 0.0) - abs(one.amplitude) for one in self.segments if one.control in LEAST)])
+        return min(
+            [
+                0.0,
+                *(
+                    (segment.end or 0.0) - abs(segment.amplitude)
+                    for segment in self.segments
+                    if segment.control in LEAST
+                ),
+            ]
+        )
 
     @cached_property
     def slides(self) -> bool:
@@ -509,11 +518,11 @@ class Program:
     @cached_property
     def cycles(self) -> list[tuple[float, float, int]]:
         """Start [s], period [s] and number of whole cycles of each segment that oscillates."""
-        found = []
+        cycles = []
         for start, segment in zip(self.corners, self.segments, strict=False):
             if segment.amplitude:
-                found.append((start, segment.period, math.floor(segment.duration / segment.period * (1 + 1e-9))))
-        return found
+                cycles.append((start, segment.period, math.floor(segment.duration / segment.period * (1 + 1e-9))))
+        return cycles
 
     def prescribed(self, number: int, time: float, start: float) -> float:
         """Return the prescribed value of segment `number` at a time [s].
@@ -539,13 +548,13 @@ class Program:
     @cached_property
     def prescribes(self) -> list[bool]:
         """Whether the program prescribes the value of each segment; a hold may keep a computed value instead."""
-        found = list[bool]()
+        flags = list[bool]()
         control = self.segments[0].control if self.segments else "load"
         for segment in self.segments:
-            is_prescribed = segment.end is not None or (segment.control == control and (not found or found[-1]))
+            is_prescribed = segment.end is not None or (segment.control == control and (not flags or flags[-1]))
             control = segment.control
-            found.append(is_prescribed)
-        return found
+            flags.append(is_prescribed)
+        return flags
 
     @cached_property
     def duration(self) -> float:
@@ -560,7 +569,16 @@ class Program:
     @cached_property
     def largest_load(self) -> float:
         """Largest load prescribed anywhere; zero if none is. A nominal pressure has no load without an area. [N]"""
-        return max([0.0, *((one.end or 0.0) + abs(one.amplitude) for one in self.segments if one.control == "load")])
+        return max(
+            [
+                0.0,
+                *(
+                    (segment.end or 0.0) + abs(segment.amplitude)
+                    for segment in self.segments
+                    if segment.control == "load"
+                ),
+            ]
+        )
 
     @cached_property
     def time_scale(self) -> float:
@@ -571,17 +589,17 @@ class Program:
         """
         sizes = dict.fromkeys(UNITS, 0.0)
         before = dict.fromkeys(UNITS, 0.0)
-        for one in self.segments:
-            sizes[one.control] = max(sizes[one.control], abs(one.end or 0.0) + abs(one.amplitude))
+        for segment in self.segments:
+            sizes[segment.control] = max(sizes[segment.control], abs(segment.end or 0.0) + abs(segment.amplitude))
         scales = [math.inf]
         jumped = False
-        for one in self.segments:
-            end = before[one.control] if one.end is None else one.end
-            change = abs(end - before[one.control])
-            before[one.control] = end
-            if one.duration > 0:
-                rate = change / one.duration + 2 * math.pi * abs(one.amplitude) / one.period
-                scales += [sizes[one.control] / rate] if rate > 0 else []
-                scales += [one.duration] if jumped else []
-            jumped = one.duration == 0 and (jumped or change > 0)
+        for segment in self.segments:
+            end = before[segment.control] if segment.end is None else segment.end
+            change = abs(end - before[segment.control])
+            before[segment.control] = end
+            if segment.duration > 0:
+                rate = change / segment.duration + 2 * math.pi * abs(segment.amplitude) / segment.period
+                scales += [sizes[segment.control] / rate] if rate > 0 else []
+                scales += [segment.duration] if jumped else []
+            jumped = segment.duration == 0 and (jumped or change > 0)
         return min(scales)

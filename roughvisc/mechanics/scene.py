@@ -136,8 +136,8 @@ class Scene:
     def next_kept(self, time: float) -> float:
         """Return the first kept time after a time; infinite if there is none, or if every step is kept. [s]"""
         kept = self.kept or ()
-        at = bisect_right(kept, time)
-        return kept[at] if at < len(kept) else math.inf
+        index = bisect_right(kept, time)
+        return kept[index] if index < len(kept) else math.inf
 
 
 @dataclass(frozen=True)

@@ -42,15 +42,15 @@ ENTERED = 0.3
 SHARED = 0.1
 #: Pressure of a cell that may have entered the contact of a soft body, over the mean pressure.
 ENTERING = 2.5
-#: Error of a quantity that has no second solution, as a part of it. The change of the pressure in a slide by one cell,
-#: and the work of a force that is taken as linear over the approach and vanishes at one end: on a sphere the error is a
-#: fifth of it, on a cone a third.
+#: Relative error of a quantity without a second solution. Used for the pressure change in a slide by one cell,
+#: and for the work of a force that vanishes at one end and is taken as linear over the approach. On a sphere the error
+#: is a fifth of this work, on a cone a third.
 UNBOUNDED = 0.25
-#: Power of the part of the friction force that decays in a step of a hold, in the error of what is left of the force.
+#: Power of the part of the friction force that decays in a step of a hold, in the error of the remaining force.
 #: Without: 5 of 9,367 rows bad instead of 3 (`closed_forms.py slides-friction --scenes 300`, seeds 51 and 52); with 3,
 #: as many, and stated over true error 2 % larger.
 UNRESOLVED = 4.0
-#: Force and approach are parabolas over a pair only if each of its steps covers at least this part of it.
+#: Force and approach are parabolas over a pair only if each step covers at least this part of the pair.
 LEAST_PART = 0.1
 
 
@@ -96,19 +96,19 @@ class Difference:
         is_soft : bool
             Whether hardly any of the compliance is instantaneous: only the shared error fades then.
         """
-        part = LASTING if is_soft else LASTING * left
+        lasting = LASTING if is_soft else LASTING * left
         return replace(
             self,
-            pressure=max(self.pressure, part * former.pressure),
-            force=max(self.force, part * former.force),
+            pressure=max(self.pressure, lasting * former.pressure),
+            force=max(self.force, lasting * former.force),
             approach=max(self.approach, LASTING * former.approach),
-            friction=max(self.friction, max(left, left_of_friction) * former.friction),  # both may share all of it
+            friction=max(self.friction, max(left, left_of_friction) * former.friction),  # may be all shared
             shared=self.shared + left * former.shared,
         )
 
-    def or_larger(self, other: Difference, part: float = 1.0) -> Difference:
-        """Return the larger error of each kind, of this one and a part of the other."""
-        larger = np.maximum(list(vars(self).values()), part * np.array(list(vars(other).values())))
+    def or_larger(self, other: Difference, factor: float = 1.0) -> Difference:
+        """Return the larger error of each kind, of this one and the other one times a factor."""
+        larger = np.maximum(list(vars(self).values()), factor * np.array(list(vars(other).values())))
         return Difference(*larger.tolist())
 
 
@@ -323,7 +323,7 @@ def work_of_pair(
     force = np.polynomial.Polynomial([begin[0], slopes[0], bends[0]])
     rate = np.polynomial.Polynomial([slopes[1], 2 * bends[1]])
     integral = (force * rate).integ()
-    curved = [float(integral(at)) for at in (early, last)]
+    curved = [float(integral(time)) for time in (early, last)]
     arches = curved[0] - straight[0], curved[1] - curved[0] - straight[1] + straight[0]
     works = []
     for point in inside:  # the straight line to the point itself, and its part of the arch above the step
@@ -334,8 +334,8 @@ def work_of_pair(
             ends = (first, end)
             known = curved[0]
             arch = arches[1]
-        part = (point.time - ends[0].time) / (ends[1].time - ends[0].time)
-        works.append(known + work_of_step(scene, ends[0], point) + part**3 * arch)
+        fraction = (point.time - ends[0].time) / (ends[1].time - ends[0].time)
+        works.append(known + work_of_step(scene, ends[0], point) + fraction**3 * arch)
     works.append(curved[1])
     errors = [abs(line - work) for line, work in zip(straight, curved, strict=True)]
     return works, errors[0], errors[1]
@@ -347,7 +347,7 @@ def transient_error(scene: Scene, start: Point, first: Point, end: Point, *, by_
     At a corner the rate of the prescribed quantity changes. A given approach then adds to the force a part that follows
     ``S(t)``, the integral of the relaxation function. With a pressure that is linear within the step, this part is
     ``h^2 / I(h)`` after the first step instead, with the integral ``I`` of the compliance. The work has the integral of
-    a parabola in place of the integral of ``S``. Both errors count twice, because the rate may change its sign. If the
+    a parabola instead of the integral of ``S``. Both errors count twice, because the rate may change its sign. If the
     compliance grows much within the step, the error may be as large as the part ``1 - h R(h) / S(h)`` of the force that
     relaxes in it, with the relaxation function ``R``. It remains to the end of the pair.
 
@@ -370,8 +370,8 @@ def transient_error(scene: Scene, start: Point, first: Point, end: Point, *, by_
     memory = scene.memory
     is_stiff = scene.memory.may_ring and scene.memory.grows(early, STIFF)
     if not by_load:
-        part = part_relaxed(memory, early) if is_stiff else part_missed(memory, early, last)
-        return 2 * part * abs(first.force - start.force) * abs(end.approach - touch(scene, start))
+        missed = part_relaxed(memory, early) if is_stiff else part_missed(memory, early, last)
+        return 2 * missed * abs(first.force - start.force) * abs(end.approach - touch(scene, start))
     integral, twice = memory.crept([early, last])
     determinant = early * integral[1] - last * integral[0]
     if abs(determinant) <= 1e-9 * last * abs(integral[1]):

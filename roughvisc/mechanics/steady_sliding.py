@@ -90,7 +90,7 @@ class SteadyState:
         Displacement; its mean is zero on a half-space, and on any body that uniform pressure compresses without end.
         [m]
     approach : float
-        Approach, without the mean displacement where that is left out. [m]
+        Approach, without the mean displacement if the kernel omits it. [m]
     power_force : float
         Friction force: dissipated power over the speed. [N]
     residual : float
@@ -436,7 +436,7 @@ def gmres(operator: Callable[[Array], Array], right: Array, enough: float) -> tu
                 length = math.sqrt(float(xp.einsum("i,i->", image, image)))
                 if length > _REPEATED * math.sqrt(float((along**2).sum())):
                     break
-            if not 0 < length < math.inf:  # there is no further direction
+            if not 0 < length < math.inf:  # the image adds no new direction
                 break
             triangle[k, k], size = length, k + 1
             directions[k + 1] = image / length

@@ -1,8 +1,9 @@
 """Lengths of the pairs of steps: the error that a pair adds, and the length of the next pair.
 
-`python workflows/benchmarks/step_constants.py "NAME=VALUE"` shows what a constant buys. Numbers below are from it,
-unless another command stands with them: convolutions of plain scenes with 1, 10 and 50 kept times, over those with the
-present value, and rows of cells in contact beyond the tolerance with one kept time, of 300, and with twenty, of 1,000.
+`python workflows/benchmarks/step_constants.py "NAME=VALUE"` shows the effect of a constant. Numbers below are from it,
+unless another command is named. The first three are convolutions of plain scenes with 1, 10 and 50 kept times, divided
+by the convolutions with the present value. The next two are rows of cells in contact beyond the tolerance: with one
+kept time, of 300, and with twenty, of 1,000.
 """
 
 from __future__ import annotations
@@ -235,8 +236,8 @@ def errors_over_allowed(
     following = second.time if lands else min(scene.next_kept(second.time), scene.program.duration)
     ahead = growth_until(scene, number, second, following)
     scales = max(force, second.size * ahead), max(approach, abs(second.approach) * ahead**0.5)
-    part = ALLOWED_SOFT if scene.is_soft else ALLOWED
-    return added(scene, pair, number, following, scales) / (part * scene.tolerance), row
+    allowed = ALLOWED_SOFT if scene.is_soft else ALLOWED
+    return added(scene, pair, number, following, scales) / (allowed * scene.tolerance), row
 
 
 def growth_until(scene: Scene, number: int, point: Point, following: float) -> float:
@@ -279,7 +280,7 @@ def added(scene: Scene, pair: Pair, number: int, following: float, scales: tuple
         change = min(change, float(abs(at_end - memory.remaining(taken) * at_start).sum()))
         ahead = following - second.time
         left = 1.0
-        if not by_load:  # what relaxes from the middle of the pair on is no longer part of the change
+        if not by_load:  # the change excludes what relaxes from the middle of the pair on
             ahead = following - pair.first.time
             left = memory.remaining(taken / 2)
         remains = max(memory.remaining(ahead) / left if left > 0 else 0.0, LEAST_REMAINING)

@@ -631,7 +631,7 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
             former = UNBOUNDED * float(abs(last.pressure - moved(fine.pressure, 1)).sum()) * grid.cell_area
         shared = max(former - error.pressure, 0.0)
         error = replace(error.or_larger(state.difference), pressure=error.pressure)
-    if cells == 1 and not memory.is_elastic:  # there is no solution with longer steps
+    if cells == 1 and not memory.is_elastic:  # a solution with longer steps does not exist
         error = replace(error, friction=abs(friction(scene, last, slide)))
     error = replace(error, shared=shared).at_least(state.difference, relaxed)
     step = points[1].time - fine.time
@@ -747,20 +747,20 @@ def take_step(
     del pressure, unit
     given: dict[str, Any] = {"load": value * alpha / area} if by_load else {"approach": value}
     try:
-        found = solve_contact(grid, gap, tolerance=tolerance, **start, **given, overwrite=True, present=scene.present)
+        contact = solve_contact(grid, gap, tolerance=tolerance, **start, **given, overwrite=True, present=scene.present)
     except ConvergenceError as error:
         raise ConvergenceError(
             f"at {time:.6g} s {error}; try a looser tolerance, a coarser grid, or layers whose moduli differ less"
         ) from error
     if grid is not scene.grid:
         scene.grid.convolutions += grid.convolutions
-    pressure = found.pressure
-    unit = found.displacement
+    pressure = contact.pressure
+    unit = contact.displacement
     pressure /= alpha
     unit /= alpha
-    force, approach = (value, found.approach) if by_load else (found.load / alpha * area, value)
+    force, approach = (value, contact.approach) if by_load else (contact.load / alpha * area, value)
     history = memory.advance(here.history, prediction, unit, pressure)
-    errors = (found.error, found.approach_error)
+    errors = (contact.error, contact.approach_error)
     stored = pressure
     if pressure.size >= PACKED_FROM and 2 * int((pressure > 0).sum()) < pressure.size:
         cells = grid.xp.flatnonzero(pressure).astype(np.int32)

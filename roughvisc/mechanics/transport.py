@@ -29,8 +29,8 @@ Grid error, measured on discs, squares at any angle, strips and Hertz contacts:
    approach on the same grid. A correction is not needed.
 2. At an edge of the material the outline is known, and the punch is too soft to first order. The problem is solved
    again on cells of half the side, and the stiffness is extrapolated: by twice the difference for an outline along the
-   cells, and by 1.2 times the difference for an oblique outline, whose cells form a staircase around it. The share of
-   faces that belong to steps distinguishes the two.
+   cells, and by 1.2 times the difference for an oblique outline. The cells of an oblique outline form a staircase. The
+   share of faces that belong to steps distinguishes the two.
 
 .. [1] P. Vaněk, J. Mandel, M. Brezina, Algebraic multigrid by smoothed aggregation for second and fourth order elliptic
    problems, Computing 56 (1996) 179-196.
@@ -178,7 +178,7 @@ def flow(gap: Array, spacing: tuple[float, float], *, wrap: bool = False) -> Flo
     error as large as the conductance.
 
     By Dirichlet's principle the dissipation of approximate pressures exceeds the conductance [2]_. The excess is the
-    work of what flows into the cells and not out of them on the remaining error of the pressures, which the next round
+    work of the net flow into the cells on the remaining error of the pressures, which the next round
     solves for. The iteration ends when it is below 1e-9 of the conductance.
 
     References
@@ -258,10 +258,10 @@ def _conductances(mobility: Array, aspect: float, wrap: bool) -> Array:
         cell to its neighbour at larger y; the face of the last column joins the borders or is closed.
     """
 
-    def in_series(one: Array, other: Array) -> Array:
+    def in_series(first: Array, second: Array) -> Array:
         # no product, which may underflow
-        low = np.minimum(one, other)
-        high = np.maximum(one, other)
+        low = np.minimum(first, second)
+        high = np.maximum(first, second)
         return 2 * low / (1 + np.divide(low, high, where=high > 0, out=np.zeros_like(low)))
 
     along = np.concatenate([2 * mobility[:1], in_series(mobility[:-1], mobility[1:]), 2 * mobility[-1:]])
@@ -448,11 +448,11 @@ def _prolongation(matrix: sparse.csr_array, cells: Numbers, width: int) -> spars
     block = along // _BLOCK * width + across // _BLOCK
     inside = block[first] == block[second]
     graph = sparse.coo_array((np.ones(inside.sum()), (first[inside], second[inside])), shape=matrix.shape)
-    _, part = sparse.csgraph.connected_components(graph, directed=False)
+    _, component = sparse.csgraph.connected_components(graph, directed=False)
     belongs = np.zeros(cells.size, dtype=bool)
     belongs[first] = belongs[second] = True
     rows = np.flatnonzero(belongs)
-    _, coarse = np.unique(part[rows], return_inverse=True)
+    _, coarse = np.unique(component[rows], return_inverse=True)
     of_coarse = sparse.csr_array((np.ones(rows.size), (rows, coarse)), shape=(cells.size, coarse.max(initial=-1) + 1))
     return of_coarse - sparse.diags_array(_RELAXATION / diagonal) @ matrix @ of_coarse
 
@@ -496,7 +496,7 @@ def frozen_contact(
         return math.inf, 0.0
     present = np.ones(contact.shape, dtype=bool) if present is None else present
     beyond: Any = {"free": "constant", "periodic": "wrap", "mirror": "symmetric"}[boundary]
-    rimmed, rim = (np.pad(one, 1, mode=beyond) for one in (contact, present))
+    rimmed, rim = (np.pad(mask, 1, mode=beyond) for mask in (contact, present))
     if boundary == "free":  # the surface outside the spots has no influence
         [(x, y)] = ndimage.find_objects(contact.astype(np.int8))
         around = slice(x.start, x.stop + 2), slice(y.start, y.stop + 2)
@@ -551,7 +551,7 @@ def _edge_energies(
     pressure : ndarray, shape (nx, ny)
         Pressure of the punch. [-]
     """
-    touching, material = (np.stack([*neighbours(one, "free")]) for one in (contact, rim))
+    touching, material = (np.stack([*neighbours(mask, "free")]) for mask in (contact, rim))
     faces = (contact & ~touching)[:, 1:-1, 1:-1]  # towards each of the four neighbours
     energy = (np.repeat(spacing, 2) * spacing[0] * spacing[1])[:, None, None] * pressure**2
     opens = faces & material[:, 1:-1, 1:-1]

@@ -78,7 +78,7 @@ def friction_theory(
 
     See Also
     --------
-    roughvisc.friction, roughvisc.psd_table, roughvisc.Heating, roughvisc.observables.persson
+    roughvisc.friction, roughvisc.psd_table, roughvisc.Heating, roughvisc.observables.persson, roughvisc.plot.waves
 
     Notes
     -----

@@ -32,9 +32,10 @@ _DOTS = 40
 def history(dataset: xr.Dataset, quantities: Sequence[str] | str | None = None, *, over: str | None = None) -> Figure:
     """Draw quantities over time, over the distance slid, over the speed, or over each other.
 
-    Lines pass through every time step, dots mark the kept times, and bands show the stated error, with the error of the
-    grid if that is in the result, unless all of it is below 1 % of the largest value. A result that has lost the
-    history of its steps has dots alone. The axis is logarithmic if the largest value exceeds thirty times the smallest.
+    Lines pass through every time step, and dots mark the kept times. Bands show the stated error, with the grid
+    error if the result contains it. A band is omitted if the error is below 1 % of the largest value everywhere. A
+    result without the history of its steps has only dots. The axis is logarithmic if the largest value exceeds thirty
+    times the smallest.
 
     Parameters
     ----------
@@ -159,7 +160,7 @@ def area_against_load(results: xr.Dataset | Mapping[str, xr.Dataset], *, contact
     Raises
     ------
     InputError
-        If the results are not those of single cases, or names of moduli are equal to no result.
+        If a result contains several cases, or the name of a modulus equals no name of a result.
 
     See Also
     --------

@@ -33,9 +33,9 @@ from roughvisc.topography.spectrum import psd
 from roughvisc.units import Quantity, Unit, listed, quantities, unit_for
 from roughvisc.variables import AXES, FIELDS, VARIABLES, axis_of
 
-#: Field -> perceptually even colour map without the colour of contact; reduction of a block of cells to one drawn cell;
-#: colour and name of the values below the scale, which are zero or, for the flux, small. Pressure, gap and flux darken
-#: as they rise.
+#: Field -> perceptually uniform colour map without the colour of contact; reduction of a block of cells to one drawn
+#: cell; colour and name of the values below the scale. These values are zero or, for the flux, small. Pressure, gap and
+#: flux are darker at larger values.
 LOOK = {
     "pressure": ("viridis_r", "max", style.NO_CONTACT, "no contact"),
     "gap": ("cividis_r", "min", style.CONTACT, "contact"),
@@ -48,7 +48,7 @@ SIGNED = "RdBu_r"
 #: Largest number of drawn cells along the longer side, and of times or speeds in one figure.
 MOST_CELLS = 1024
 _MOST_FRAMES = 8
-#: Flux that stands for zero. [m^2/s]
+#: Flux that replaces zero on a logarithmic scale. [m^2/s]
 _NO_FLOW = 1e-300
 #: Part of the positive values within a colour scale [%], unless the largest value is less than this times larger.
 _SHOWN = 99.8
@@ -56,7 +56,7 @@ _SPIKE = 1.2
 
 
 def rows_at(places: Any, axis: str, key: str, count: int, most: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return times or speeds, and which of them are negative whole numbers, which count rows from the end.
+    """Return times or speeds, and a mask of the negative whole numbers, which count rows from the end.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ class Ends(NamedTuple):
 def scale_ends(name: str, frames: Iterable[xr.DataArray]) -> Ends:
     """Return the ends of the scale of a field at some rows. [SI]
 
-    Few values far beyond all others are outside the scale. Fields that begin at zero count where they are positive.
+    Few values far beyond all others are outside the scale. Only the positive values of a field from zero count.
     """
     begins_at_zero = LOOK.get(name, LOOK["displacement"])[2] is not None
     ends = list[Any]()

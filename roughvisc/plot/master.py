@@ -43,7 +43,7 @@ def master_curve(material: Prony | Creep) -> Figure:
     Raises
     ------
     InputError
-        If the material is not of such a table.
+        If the material is not from a table with several temperatures.
 
     See Also
     --------

@@ -143,7 +143,7 @@ def report(results: str | Path | xr.Dataset, path: str | Path | None = None, *, 
     drawn = set()
     for number, case in enumerate(page["cases"]):
         case["number"] = numbers.get(case["key"], "") if numbers else number
-        if "surface" in case:  # once, if several cases have it
+        if "surface" in case:  # once, if several cases share it
             picture = case["surface"]["picture"]["src"]
             case["surface"] = None if picture in drawn else case["surface"]
             drawn.add(picture)

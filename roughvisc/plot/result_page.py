@@ -167,7 +167,7 @@ def page(results: str | Path | xr.Dataset, path: str | Path | None = None) -> Pa
 
 @dataclass(frozen=True)
 class _Source:
-    """Result of one case, opened as often as it is read.
+    """Result of one case, opened again at each read.
 
     Attributes
     ----------
@@ -219,7 +219,7 @@ def _sources(results: Any) -> tuple[list[_Source], Path]:
 
 
 def _note(sources: Sequence[_Source], thinning: _Thinning) -> str:
-    """Return what the page leaves out, as a sentence; empty if it has everything."""
+    """Return a sentence that lists the omitted data; empty if the page is complete."""
     parts = []
     most = max(source.rows for source in sources)
     if thinning.rows < most:
@@ -245,7 +245,7 @@ def _cases(sources: Sequence[_Source], thinning: _Thinning) -> tuple[list[dict[s
 
 
 def _case(dataset: xr.Dataset, number: int, thinning: _Thinning) -> dict[str, Any]:
-    """Return what the page shows of one case: names, kept rows, facts, histories and fields."""
+    """Return the content of the page for one case: names, kept rows, facts, histories and fields."""
     axis = axis_of(dataset.variables)
     dataset = dataset.sortby(axis)
     if dataset.nbytes <= _IN_MEMORY:
@@ -378,7 +378,7 @@ def _packed(dataset: xr.Dataset, name: str, rows: Sequence[int], cells: int) -> 
                 part = np.clip(1 + np.log10(values / (most or 1.0)) / decades, 0, 1)
         else:
             part = (values - least) / spread
-        levels = np.ceil(part * LEVELS) if below else np.round(part * LEVELS)  # what is above zero stays above it
+        levels = np.ceil(part * LEVELS) if below else np.round(part * LEVELS)  # positive values stay positive
         codes = np.where(np.isnan(levels), LEVELS + 1, levels).astype("<u2")
         data += compressor.compress((codes - before).tobytes())
         before = codes

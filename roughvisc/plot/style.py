@@ -35,7 +35,7 @@ OUTLINE = "#1d2328"
 #: Mean width of a letter of 8 points, and height of a line of text. [inch]
 LETTER = 0.066
 _LINE = 0.16
-#: Markers and dashes of lines that are told apart without colours.
+#: Markers and dashes that distinguish lines without colours.
 _MARKERS = "os^DvPX*"
 _DASHES = ("-", (0, (5, 1.5)), (0, (6, 1.5, 1, 1.5)), (0, (1.5, 1.2)))
 #: Width of a colour bar with its labels. [inch]

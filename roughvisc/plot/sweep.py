@@ -178,7 +178,7 @@ def _draw(table: pd.DataFrame, quantity: xr.DataArray, columns: list[str], over:
         raise InputError(f"{name} has no value to draw")
     unit = style.middle_unit(table[name][table[name] > 0] if name == "leak_rate" else table[name], si)
     table = table.assign(shown=unit(table[name]))
-    # families tell the lines of a panel apart
+    # each line of a panel is one family
     across = columns[0]
     families = columns[1:2]
     rest = columns[2:]

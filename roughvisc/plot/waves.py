@@ -1,4 +1,4 @@
-"""Figure of a theory of rubber friction: what each decade of waves contributes, and how warm the rubber is there."""
+"""Figure of the theory of rubber friction: contribution and temperature of each decade of waves."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from roughvisc.plot import style
 from roughvisc.units import format_quantity
 
 #: Largest number of speeds, and their colours from slow to fast.
-_SPEEDS, _COLOURS = 5, "viridis"
+_SPEEDS = 5
+_COLOURS = "viridis"
 
 
 @style.apply
@@ -27,13 +28,26 @@ def waves(dataset: xr.Dataset) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        Left, the contribution of each decade of waves to the friction coefficient over the wavelength; right, with the
-        heat of sliding, the temperature of the rubber at the depth of each decade.
+        The left panel shows the contribution of each decade of waves to the friction coefficient, over the wavelength.
+        With the heat of sliding the right panel shows the temperature of the rubber at the depth of each decade.
 
     Raises
     ------
     InputError
         If the result has no contributions of waves.
+
+    See Also
+    --------
+    roughvisc.friction_theory, roughvisc.Heating
+
+    Examples
+    --------
+    >>> import roughvisc as rv
+    >>> road = rv.psd_table([1e3, 1e4, 1e6], [1e-17, 1e-17, 1e-24], convention="persson")
+    >>> rubber = rv.zener(shear_modulus=1e8, kelvin_modulus=1e6, kelvin_viscosity=10.0)
+    >>> ds = rv.friction_theory(road, rubber, speeds=[1e-3, 0.1, 10.0], pressure="0.3 MPa")
+    >>> len(rv.plot.waves(ds).axes)
+    1
     """
     if "friction_of_waves" not in dataset:
         raise InputError(key="dataset", found=list(dataset), expected="a result of rv.friction_theory")

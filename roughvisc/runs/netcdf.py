@@ -169,7 +169,7 @@ class ResultBackend(BackendEntrypoint):
     """Engine of xarray that reads fields over x and y when they are needed, and everything else immediately."""
 
     def open_dataset(self, filename_or_obj: Any, *, drop_variables: Any = None, steps: bool = True) -> xr.Dataset:
-        """Open a file as the engine ``netcdf4`` does, with durations as plain numbers; with the steps if asked for."""
+        """Open a file like the engine ``netcdf4``, with durations as plain numbers, and with the steps if requested."""
         path = os.path.abspath(os.fspath(filename_or_obj))  # other processes may work in another folder
         with NETCDF, netCDF4.Dataset(**_named(path)) as file:
             file.set_auto_maskandscale(False)

@@ -72,8 +72,8 @@ def observe(
     >>> case = rv.Case(ball, rv.zener(3e6, 1e6, 1e5), press, tolerance=1e-2, times=3)
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     ds = rv.run(case, folder, progress=False).load()
-    ...     asked = rv.vary(case, {"observe": {"conductance": {"resistivity": ["0.2 K m/W", 0]}}})
-    ...     changed = rv.observe([asked], folder, progress=False)
+    ...     with_conductance = rv.vary(case, {"observe": {"conductance": {"resistivity": ["0.2 K m/W", 0]}}})
+    ...     changed = rv.observe([with_conductance], folder, progress=False)
     >>> len(changed)
     1
     """

@@ -41,8 +41,8 @@ _LAST_HEIGHT: dict[str, xr.DataArray] = {}
 
 #: Facts that a stored result omits, because its attribute ``case`` determines them.
 _IN_THE_CASE = ("compliance_at_end", "poisson", "time_scale", "base")
-#: How a case ended. ``hindered``: stopped by a cause outside the case (a full disk, too little memory, a killed
-#: process, another run of the case), so that the same command resumes it; ``failed``: it would fail again.
+#: How a case ended. ``hindered``: stopped by a cause outside the case, such as a full disk, too little memory, a killed
+#: process, or another run of the case; the same command resumes it. ``failed``: it would fail again.
 Kind = Literal["done", "failed", "hindered", "interrupted"]
 #: Errors of a case that another run computes, and of a full disk.
 IN_USE = errno.errorcode[errno.EWOULDBLOCK]
@@ -261,9 +261,7 @@ def is_result_of(case: Case, path: Path) -> bool:
     except DamagedError:
         return False
     if stored_key != case.key:
-        raise unusable(
-            path, f"holds the result of case {stored_key}", f"the result of case {case.key}, as its name says"
-        )
+        raise unusable(path, f"holds the result of case {stored_key}", f"the result of case {case.key}, as in its name")
     return True
 
 

@@ -578,8 +578,8 @@ def vary(case: Case, changes: Mapping[str, Any], *, zip: bool = False) -> Any:
     Returns
     -------
     Case or list of Case
-        A list if any value is a list or a dictionary of names. In such a list a case leaves out the times after the end
-        of its own program.
+        A list if any value is a list or a dictionary of names. A case in this list omits the times after the end
+        of its program.
 
     Raises
     ------

@@ -30,22 +30,7 @@ def properties(
 ) -> dict[str, Any]:
     """Return the stated properties, in SI.
 
-    Parameters
-    ----------
-    work_of_adhesion : float or str, optional
-        Work of adhesion of the two surfaces. [J/m2]
-    yield_strength : float or str, optional
-        Tensile yield strength of the body that yields first. [Pa]
-    thickness : float or str, optional
-        True thickness of the body that is modelled as a half-space. [m]
-    base : {"bonded", "slipping"}, optional
-        Contact of this body with its base; default: bonded.
-    density : float or str, optional
-        Density of the body. [kg/m3]
-    heat_conductivity : float or str, optional
-        Heat conductivity of the body. [W/(m K)]
-    volumetric_heat_capacity : float or str, optional
-        Volumetric heat capacity of the body: density times specific heat. [J/(m3 K)]
+    The parameters are described in :func:`roughvisc.audit`.
 
     Raises
     ------

@@ -20,7 +20,7 @@ from roughvisc.mechanics.grid import COARSE, Grid
 
 try:
     import cupy
-except ImportError:  # tools that import every module need no GPU
+except ImportError:  # tools that import every module must work without a GPU
     cupy = None
 
 Array = Any  # an array of CuPy
@@ -190,7 +190,7 @@ def cut_step(
 def line_search(
     held: Array, trial: Array, change: Array, slope: float, response: Array, cells: Array
 ) -> tuple[float, float, float]:
-    """Return the curvature of the energy along a trial, the fraction of it at the minimum, and the fraction to take."""
+    """Return the curvature of the energy along a trial, its fraction at the minimum, and the fraction to take."""
     curvature, empties, steepest, *_ = summed("line_search", held.size, held, trial, change, response, cells).tolist()
     minimum = min(-slope / curvature, LONGEST_STEP) if curvature > 0 else LONGEST_STEP
     if empties > 0:

@@ -21,7 +21,7 @@ Array = Any  # an array of NumPy or CuPy
 Last = tuple[Array, Array, Array, float]
 #: Largest ratio of a step to its trial: the periodic kernel does not resist a uniform pressure.
 LONGEST_STEP = 30.0
-#: Number of cells that are processed at once, so that intermediate results stay in the cache.
+#: Number of cells in a block, so that intermediate results stay in the cache.
 BLOCK = 1 << 15
 #: Reduction of the residual of the equations of the blocks, and largest number of iterations. With four instead of
 #: about eight iterations, creep on 1,024 x 1,024 cells needs 3 % more convolutions of the cells and 3 % less time.
@@ -154,7 +154,7 @@ def cut_step(
 def line_search(
     held: Array, trial: Array, change: Array, slope: float, response: Array, cells: Array
 ) -> tuple[float, float, float]:
-    """Return the curvature of the energy along a trial, the fraction of it at the minimum, and the fraction to take.
+    """Return the curvature of the energy along a trial, its fraction at the minimum, and the fraction to take.
 
     A trial that empties cells is taken whole if the energy decreases up to its end, so that these cells leave the
     contact. A longer step ends where the pressure of a cell becomes zero.

@@ -7,7 +7,7 @@ While the contact of a sphere or a cone grows, force and depth are linear in the
     q(t) = 1/k int J(t - s) dF(s),  J(t) = J_0 + phi t + sum J_i (1 - exp(-t / tau_i))
 
 so that one non-negative fit gives the series. The contact point is the other unknown. It and the bands are fitted to
-the force, whose noise is larger than that of the depth: noise in the columns of a fit would make it biased.
+the force, whose noise is larger than the noise of the depth: noise in the columns of a fit would make it biased.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Indentation:
         return np.asarray(np.maximum(self.depth - contact, 0.0) ** self.exponent)
 
     def noise(self, contact: float) -> Array:
-        """Return the standard deviation of the force, with that of the depth times the slope of the force. [N]
+        """Return the standard deviation of the force, plus the noise of the depth times the slope of the force. [N]
 
         Without the noise of the depth, a contact point with smaller slopes would be preferred.
         """

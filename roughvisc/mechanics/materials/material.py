@@ -456,7 +456,7 @@ def creep(
         Poisson ratio, constant in time.
     laplace : callable, optional
         ``s`` times the Laplace transform of ``J``, [1/Pa], for an array of real or complex rates ``s`` [1/s]. With it
-        friction and layers need no fitted series.
+        friction and layers do without a fitted series.
 
     Returns
     -------

@@ -5,7 +5,7 @@ error. The terms of a series are positive, so that it is a passive material. It 
 material, so that jumps are exact. Both compliances increase. Before the shortest time they therefore differ by less
 than the creep up to this time.
 
-Under oscillating pressure a material has a complex compliance. Some materials have it in closed form. Any other one
+Under oscillating pressure a material has a complex compliance. Some materials have a closed form. Any other one
 is replaced by a certified series.
 """
 

@@ -6,7 +6,7 @@ unknowns (variable projection [1]_). No overlap of neighbouring temperatures has
 
 References
 ----------
-.. [1] G. H. Golub and V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413-432; the Jacobian is that of L. Kaufman, BIT 15
+.. [1] G. H. Golub and V. Pereyra, SIAM J. Numer. Anal. 10 (1973) 413-432; Jacobian by L. Kaufman, BIT 15
    (1975) 49-57.
 .. [2] J. G. MacKinnon and H. White, J. Econometrics 29 (1985) 305-325, estimator HC3.
 """
@@ -32,7 +32,7 @@ Quantity = Literal["storage", "loss", "storage and loss", "relaxation", "creep"]
 
 #: Largest difference of neighbouring temperatures that count as one. [K]
 SAME_TEMPERATURE = 1.5
-#: Terms of the series per decade, and factor by which their times extend beyond those of the rows.
+#: Terms of the series per decade, and factor by which their times extend beyond the times of the rows.
 _PER_DECADE = 3.0
 _BEYOND = 3.0
 #: Error of a modulus relative to ``|G*|`` over its error relative to itself. A machine measures an angle, so that the
@@ -272,7 +272,7 @@ class _Rows:
 
     @classmethod
     def both(cls, storage: _Rows, loss: _Rows) -> _Rows:
-        """Return the rows of the storage modulus, and those of the loss modulus after them."""
+        """Return the rows of the storage modulus, followed by the rows of the loss modulus."""
         return cls(
             "storage and loss",
             np.concatenate([storage.at, loss.at]),
@@ -384,8 +384,8 @@ class _Fit:
     def deviations(self, jacobian: Array) -> Array:
         """Return the standard deviations of the free shifts; NaN if the rows are too few.
 
-        Rows that share one variance give one estimate. The weights of the rows are not those of their scatter, so that
-        the scatter of the rows that determine a shift gives another one. The larger one counts.
+        Rows that share one variance give one estimate. The weights do not follow from the scatter of the rows.
+        Therefore the scatter of the rows that determine a shift gives a second estimate. The larger one counts.
         """
         columns = self.columns[:, self.weights > 0]
         spare = jacobian.shape[0] - jacobian.shape[1] - columns.shape[1]

@@ -31,8 +31,8 @@ Columns = tuple[Array, ...]
 _OFFERED = (1, 1.5, 2, 3, 4, 6, 12, 24)
 #: A fit with fewer terms may have an rms misfit larger by this factor than the smallest one.
 _FEWER = 1.1
-#: Number of values per decade below which a smooth spectrum is fitted, its terms per decade, and the weight of the
-#: differences between neighbouring terms next to the misfit of the rows.
+#: Number of values per decade below which a smooth spectrum is fitted, and the terms per decade of this spectrum.
+#: Weight of the differences between neighbouring terms, relative to the misfit of the rows.
 _FEW = 2.5
 _SMOOTH = 3
 _STEPS = 0.01
@@ -48,9 +48,9 @@ _CREEP = (10.0, 1e-7)
 #: others, whose largest ratio was 1.02 to 1.06.
 _ONE_TEMPERATURE = 1.1
 _SAME_FREQUENCY = 1e-3
-#: Decades before the first time of a relaxation test that are extrapolated, and scale of these rows over their modulus;
-#: largest time of the rows that are continued, over the first one, their smallest number, and the ratio of the first to
-#: the mean slope from which they are the tail of one process.
+#: Decades before the first time of a relaxation test that are extrapolated, and scale of these rows over their modulus.
+#: Then for the first rows, from which the extrapolation starts: their largest time over the first time, their smallest
+#: number, and the ratio of the first to the mean slope above which they are the tail of one process.
 _EXTRAPOLATED = 1.5
 _BEFORE = 10.0
 _FIRST_ROWS = 4.0
@@ -98,7 +98,7 @@ def creep_table(
     temperatures : sequence of float or str
         Temperature of each row, if there are several. The times begin again at each. [K]
     temperature : float or str
-        Temperature of the contact, within those of the rows; without a default if there are several. [K]
+        Temperature of the contact, within the range of the rows; without a default if there are several. [K]
     vertical : {"none", "rubber"}
         Whether moduli are proportional to the absolute temperature too; without a default if there are several.
     note : str
@@ -248,7 +248,7 @@ def dynamic_table(
     temperatures : sequence of float or str
         Temperature of each row, instead of shift factors. Rows within 1.5 K of each other count as one temperature. [K]
     temperature : float or str
-        Temperature of the contact, within those of the rows; without a default if there are several. [K]
+        Temperature of the contact, within the range of the rows; without a default if there are several. [K]
     vertical : {"none", "rubber"}
         Whether moduli are proportional to the absolute temperature too; without a default if there are several.
         ``"rubber"`` suits melts and rubbers, ``"none"`` polymers near the glass transition.
@@ -265,7 +265,7 @@ def dynamic_table(
     InputError
         If a number is not finite or negative by more than noise, or a frequency or a shift factor is not positive; if
         rows of one frequency have moduli that differ by more than 10 % or twice the noise; if all rows have one
-        frequency; or if the temperature is not within those of the rows. The row is named.
+        frequency; or if the temperature is outside the range of the rows. The message names the row.
 
     See Also
     --------
@@ -327,7 +327,7 @@ class _Measured:
     is_master: bool = False
 
     def at_temperature(self, columns: Columns, temperatures: Sequence[float], temperature: float | None) -> Prony:
-        """Return the material at a temperature: that of the rows, or one of several."""
+        """Return the material at the temperature of the rows, or at one of several temperatures."""
         if not len(temperatures):
             for key, value in (("temperature", temperature), ("vertical", self.vertical)):
                 if value is not None:
@@ -560,16 +560,16 @@ def _superposed(known: _Measured, *columns: tuple[float, ...]) -> ThermalLaw:
         one_temperature = known.checked(tuple(column[rows] for column in given), rows)
         parts.append(one_temperature)
         of_parts.append(np.full(one_temperature.columns[0].size, temperatures[rows].mean()))
-    at, *values = (
+    ages, *values = (
         np.concatenate(column) for column in zip(*(one_temperature.columns for one_temperature in parts), strict=True)
     )
     names: tuple[Any, ...] = ("storage", "loss") if known.quantity == "dynamic" else (known.quantity,)
-    later = at > 0  # a row at time zero has no reduced time
+    later = ages > 0  # a row at time zero has no reduced time
     values = [value[later] for value in values]
     is_noisy = known.quantity == "relaxation" and values[0].min() <= 0
     least = known.noise * float(values[0].max()) if is_noisy else 0.0
     rows_of = dict(zip(names, values, strict=True))
-    superposed = superpose(np.concatenate(of_parts)[later], at[later], rows_of, known.vertical, least)
+    superposed = superpose(np.concatenate(of_parts)[later], ages[later], rows_of, known.vertical, least)
     superposed = replace(superposed, bounds=(float(temperatures.min()), float(temperatures.max())), factor=factor)
     reduced, rows_at_reference = superposed.reduced()
     order = np.argsort(reduced, kind="stable")
@@ -698,9 +698,9 @@ def _gap(times: Array) -> str:
 def _earlier(times: Array, moduli: Array) -> tuple[Array, Array]:
     """Return times before the first of a relaxation test, ascending [s], and moduli there.
 
-    The modulus goes on as a power of time with the mean slope of the first rows or of the first decade, or flattens
-    towards earlier times as it does in the first rows, whichever rises less. It is not continued if the first rows are
-    the tail of one fast process. A series without these rows ends at a third of the first time: its
+    On logarithmic axes the modulus has the flatter one of two slopes: the mean slope of the first rows or of the first
+    decade, and a slope that flattens towards earlier times like the first rows. It is not continued if the first rows
+    are the tail of one fast process. A series without these rows ends at a third of the first time: its
     compliance there is a quarter too large for a polymer in the glass transition.
     """
     nothing = np.zeros(0)
