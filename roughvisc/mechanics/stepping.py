@@ -270,7 +270,8 @@ def next_segment(scene: Scene, state: State) -> State:
         start = point.approach if following.control == "approach" else load if jumped else point.force
         is_late = jumped or (corner.is_abrupt and not point.is_open)
         points.append(replace(without_past(point), start=start, is_late=is_late))
-    length = state.next_length if corner.is_smooth and not fine.is_open else 0.0
+    keeps_length = corner.is_smooth and not fine.is_open and scene.adhesion is None
+    length = state.next_length if keeps_length else 0.0
     return replace(state, fine=points[0], twice=points[1] if state.twice else None, segment=index, next_length=length)
 
 

@@ -219,3 +219,18 @@ def test_maps_of_tension__have_zero_in_the_middle_of_their_scale():
     assert all(image.norm.vmin < 0 < image.norm.vmax for image in images[:3])
     cells = rv.observables.contact(ds).sum(("x", "y")).values
     assert cells[0] > (ds.pressure[0] > 0).sum(), "contact cells may be under tension"
+
+
+def test_work_of_a_fast_retraction_after_a_hold__is_that_at_a_sharper_tolerance():
+    """The tension passes its largest value soon after the corner, and is gone at the end of the segment."""
+    side, rubber = 7e-6, rv.zener(0.3e6, 0.1e6, 5e4)
+    surface = rv.self_affine(side, 48, hurst=0.8, rms_height=4e-8, rolloff=3.5e-6, shortcut=6e-7, seed=2)
+    sticky = rv.adhesion(work="5 mJ/m2", range="60 nm")
+    program = rv.Program().approach(6e-8, over=0).hold(0.3).approach(-4e-7, over=0.1)
+    loose, sharp = (
+        press(surface, program, rubber, sticky, boundary="periodic", tolerance=one, fields=(), times=24)
+        for one in (1e-2, 3e-3)
+    )
+    off = abs(float(loose.work[-1] - sharp.work[-1]))
+    assert off <= float(loose.work_error[-1] + sharp.work_error[-1])
+    assert off < 0.02 * float(sharp.work[-1])

@@ -81,8 +81,7 @@ def test_second_crest_that_enters_just_before_a_row__states_its_uncertain_pressu
     """
     program = rv.Program().pressure(0.03, over=1.0)
     errors = [
-        errors_after_second_crest(0.1, 1.0, program, ((np.arange(7) + shift) / 7).tolist())
-        for shift in (0.35, 0.45, 0.55)
+        errors_after_second_crest(0.1, 1.0, program, ((np.arange(7) + shift) / 7).tolist()) for shift in (0.3, 0.5, 0.7)
     ]
     true, stated = np.array(errors).swapaxes(0, 1)
     assert true.max() > 2
