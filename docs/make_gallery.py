@@ -207,7 +207,7 @@ SEEN = {
     "coating": (
         "Left, a map of the compliance over wavelength and frequency; right, friction and contact fraction against "
         "speed for five thicknesses",
-        "Left: waves shorter than about twice the thickness (dashed line) deform the coating alone. Right: a coating of "
+        "Left: waves up to twice as long as the thickness (dashed line) deform the coating alone. Right: a coating of "
         "20 µm acts nearly as a half-space; one of 2 µm has a quarter of its contact at low speed.",
     ),
     "moving_line": (

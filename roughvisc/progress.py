@@ -70,7 +70,8 @@ class Bars(Progress):
 
     def say(self, line: str) -> None:
         """Write a line, above the bars if there are any."""
-        self.console.print(Text(printable(line)), soft_wrap=True)
+        to_file = not self.console.is_terminal  # a terminal without wrapping breaks lines inside words
+        self.console.print(Text(printable(line)), soft_wrap=to_file)
 
 
 @contextmanager

@@ -123,7 +123,8 @@ def number(
     for word, compare, limit in bounds:
         if limit is not None:
             is_within = is_within and compare(magnitude, limit)
-            words.append(f"{word} {limit:g}")
+            has_unit = limit != 0 and unit not in ("", "1")
+            words.append(f"{word} {format_quantity(limit, unit) if has_unit else f'{limit:g}'}")
     if is_within:
         return magnitude
     kind = "a number" if unit in ("", "1") else f"a number [{unit}], or text with a unit,"

@@ -75,6 +75,8 @@ def completed(text):
     """A study of which the page shows a part, with the tables that it lacks."""
     stated = tomllib.loads(text)
     lacking = {name: table for name, table in BASE.items() if name not in stated}
+    if "program.0.pressure" in stated.get("sweep", {}):  # of a study by `roughvisc new`
+        lacking["program"] = [{"pressure": "6 kPa", "over": "50 ms"}]
     if "friction" in stated:
         lacking = {name: table for name, table in lacking.items() if name not in ("program", "keep")}
     return text + "\n" + study_text(lacking)

@@ -112,6 +112,12 @@ def test_number__outside_its_bounds_is_refused(value, bounds):
         number(value, "m", "radius", **bounds)
 
 
+def test_number__states_its_limit_in_a_suitable_unit():
+    with pytest.raises(InputError) as refusal:
+        number(1e-6, "m", "cutoff", least=6.25e-5)
+    assert "62.5 µm" in str(refusal.value)
+
+
 @pytest.mark.parametrize(
     ("values", "si", "text"),
     [

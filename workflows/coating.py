@@ -20,6 +20,8 @@ BASE = rv.from_relaxation(20e6, [100e6, 100e6], [1e-4, 1e-2], poisson=0.45)
 THICKNESSES = (2e-6, 5e-6, 10e-6, 20e-6, np.inf)  # m
 SPEEDS = np.geomspace(1e-3, 10, 13)  # m/s
 PRESSURE = 1e5  # Pa
+#: Colour, and marker and dash of a thickness.
+LOOKS = (("#D55E00", "o-"), ("#E69F00", "s--"), ("#009E73", "^-."), ("#0072B2", "D:"), ("k", "v-"))
 
 
 def main(cells=80, figure="coating.png", speeds=SPEEDS):
@@ -30,11 +32,10 @@ def main(cells=80, figure="coating.png", speeds=SPEEDS):
     fig = Figure(figsize=(11, 3.4), layout="constrained")
     compliance, friction, area = fig.subplots(1, 3)
     draw_compliance(fig, compliance)
-    colours = ["#D55E00", "#E69F00", "#009E73", "#0072B2", "k"]
-    for (thickness, ds), colour in zip(curves.items(), colours, strict=True):
+    for (thickness, ds), (colour, look) in zip(curves.items(), LOOKS, strict=True):
         label = f"{1e6 * thickness:g} µm" if np.isfinite(thickness) else "half-space"
         for axes, name, unit in ((friction, "friction_coefficient", 1), (area, "contact_fraction", 100)):
-            axes.semilogx(ds["speed"], unit * ds[name], "o-", ms=3, lw=1.2, color=colour, label=label)
+            axes.semilogx(ds["speed"], unit * ds[name], look, color=colour, ms=4, lw=1.2, mfc="w", label=label)
     friction.set(xlabel="speed [m/s]", ylabel="friction coefficient", ylim=(0, None))
     area.set(xlabel="speed [m/s]", ylabel="contact fraction [%]", ylim=(0, None))
     area.legend(frameon=False, title="thickness")

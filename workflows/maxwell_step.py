@@ -58,17 +58,18 @@ def compare(axes, rubber, times, cells, unit_of_time):
     ds = rv.simulate(ball, rubber, program, times=times, tolerance=1e-3, progress=False)
     distance = np.hypot(ds.x - size / 2, ds.y - size / 2)
     errors = []
-    for i, (t, colour) in enumerate(zip(times, ("#000000", "#0072B2", "#D55E00", "#009E73"), strict=True)):
+    colours = ("#000000", "#0072B2", "#D55E00", "#009E73")
+    for i, (t, colour, marker) in enumerate(zip(times, colours, "os^D", strict=True)):
         r = np.linspace(0, 1.1 * float(exact.radius(t)), 400)
         axes.plot(r / hertz.radius, pressure_of(exact, r, t) / hertz.peak_pressure, color=colour, lw=1.2)
         middle = ds.pressure[i, :, cells // 2]
-        axes.plot(distance[:, cells // 2] / hertz.radius, middle / hertz.peak_pressure, "o", ms=2.8, mfc="none",
+        axes.plot(distance[:, cells // 2] / hertz.radius, middle / hertz.peak_pressure, marker, ms=2.8, mfc="none",
                   color=colour, label=f"$t = {t / unit_of_time:g}\\,\\tau$")  # fmt: skip
         error = np.abs(ds.pressure[i].values - pressure_of(exact, distance.values, t)).sum()
         errors.append(float(error / ds.pressure[i].sum()))
     axes.set(xlabel="radius over Hertz radius, $r / a_H$", ylabel="pressure over Hertz peak, $p / p_H$")
     axes.set(xlim=(0, None), ylim=(0, None))
-    axes.legend(title="computed; lines: closed form", frameon=False)
+    axes.legend(title="computed; lines: closed form", frameon=False, fontsize="small", title_fontsize="small")
     return max(errors)
 
 

@@ -58,7 +58,13 @@ def rolling(figure=None):
         fig, axes = plt.subplots(figsize=(4.6, 2.8), layout="constrained")
         for number, (case, row) in enumerate(rows.items()):
             x, computed = row["profile"]
-            axes.plot(x, computed, color=f"C{number}", label=f"case {case}, {1e3 * row['time [s]']:g} ms")
+            axes.plot(
+                x,
+                computed,
+                "-" if number == 0 else "--",
+                color=f"C{number}",
+                label=f"case {case}, {1e3 * row['time [s]']:g} ms",
+            )
             axes.plot(0.16 * np.array(row["cells by CONTACT"]), [0, 0], "|", color=f"C{number}", markersize=12)
             axes.axhline(row["peak by CONTACT [MPa]"], color=f"C{number}", linestyle=":")
         axes.set(xlim=(-7, 9), xlabel="x along the motion [mm]", ylabel="Pressure [MPa]")
@@ -139,8 +145,9 @@ def brain(figure=None):
     if figure:
         fig, axes = plt.subplots(figsize=(4.6, 2.8), layout="constrained")
         axes.plot(record.time, 1e6 * record.approach, color="0.5", label="measured")
-        for name, (time, depth) in curves.items():
-            axes.plot(time, 1e6 * depth, label=f"contact {name}")
+        dashes = ("-", "--", "-.", ":", (0, (1, 2)))
+        for dash, (name, (time, depth)) in zip(dashes, curves.items(), strict=True):
+            axes.plot(time, 1e6 * depth, linestyle=dash, label=f"contact {name}")
         axes.axvspan(middle, end, color="0.93", zorder=0)
         axes.set(xlim=(2.8, 6.1), ylim=(29.4, 32), xlabel="Time [s]", ylabel="Depth from the first row [µm]")
         axes.text(5.25, 31.75, "predicted", ha="center")

@@ -27,6 +27,7 @@ SPEEDS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
 HOLDS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
 #: Speed up to which the body around an advancing line is relaxed [ranges per s].
 FASTEST_ADVANCE = 1.0
+BLUE, VERMILION = "#0072b2", "#d55e00"
 #: Contact radii at which the work of the line is taken, over the largest one.
 PARTS = (0.8, 0.7, 0.6)
 
@@ -98,14 +99,14 @@ def main(figure="moving_line.png", speeds=SPEEDS, holds=HOLDS, cells=64):
     fig = Figure(figsize=(8.4, 3.5), layout="constrained")
     line, dwell = fig.subplots(1, 2)
     table = []
-    for recedes, colour, name in ((True, "C0", "recedes"), (False, "C1", "advances")):
+    for recedes, colour, name, marker in ((True, BLUE, "recedes", "o"), (False, VERMILION, "advances", "s")):
         slow = [speed for speed in speeds if recedes or speed <= FASTEST_ADVANCE]
         points = [measured(speed, cells, recedes=recedes) for speed in slow]
         of_line = np.concatenate([point[0] for point in points])
         work = np.concatenate([point[1] for point in points])
         expected = [theory(speed, recedes=recedes) for speed in of_line]
         table.append((name, of_line, work, np.array(expected)))
-        line.plot(of_line, work, "o", color=colour, label=f"line {name}", markersize=4)
+        line.plot(of_line, work, marker, color=colour, mfc="w" if recedes else None, label=f"line {name}", markersize=4)
         drawn = np.geomspace(0.1, 1000, 80)
         line.plot(drawn, [theory(speed, recedes=recedes) for speed in drawn], color=colour)
         for row in zip(of_line, work, expected, strict=True):
@@ -121,10 +122,11 @@ def main(figure="moving_line.png", speeds=SPEEDS, holds=HOLDS, cells=64):
         frameon=False, fontsize=8, title="points: computed, lines: theory", title_fontsize=8, loc="lower left",
         bbox_to_anchor=(0.0, 0.17), alignment="left",
     )  # fmt: skip
-    for speed, colour in ((1.0, "C2"), (10.0, "C3")):
+    for speed, colour, look in ((1.0, BLUE, "o-"), (10.0, VERMILION, "s--")):
         largest = pull_offs(holds, speed, cells)
         table.append((speed, np.array(holds), np.array(largest), None))
-        dwell.plot(holds, largest, "o-", color=colour, label=f"{speed:g} range{'s' * (speed != 1)} per s", markersize=4)
+        name = f"{speed:g} range{'s' * (speed != 1)} per s"
+        dwell.plot(holds, largest, look, color=colour, label=name, markersize=4)
         print(f"pull-off at {speed:g} ranges/s after holds of {holds} s: {np.round(largest, 3)} pi w R")
     dwell.set(xscale="log", xlabel="time of hold [retardation times]", ylabel=r"pull-off $/\,\pi w R$")
     dwell.set_ylim(bottom=0)

@@ -69,12 +69,14 @@ def main(figure="tyre_on_asphalt.png", speeds=SPEEDS):
     warm, cold = curves(speeds)
     fig = Figure(figsize=(11, 3.6), layout="constrained")
     friction, temperature, waves = fig.subplots(1, 3)
-    for place, celsius in enumerate(TEMPERATURES):
+    for place, (celsius, marker) in enumerate(zip(TEMPERATURES, "os^Dv", strict=True)):
+        every = (place, 6)  # first and next point with a marker
         colour = colormaps["plasma"](0.9 * place / len(TEMPERATURES))
         ds = warm[celsius]
-        friction.semilogx(speeds, ds.friction_coefficient, color=colour)
+        friction.semilogx(speeds, ds.friction_coefficient, marker + "-", color=colour, ms=4, markevery=every)
         friction.semilogx(speeds, cold[celsius].friction_coefficient, "--", lw=0.9, color=colour)
-        temperature.semilogx(speeds, ds.temperature - 273.15, color=colour, label=f"{celsius} °C")
+        warmed = ds.temperature - 273.15
+        temperature.semilogx(speeds, warmed, marker + "-", color=colour, ms=4, markevery=every, label=f"{celsius} °C")
     friction.set(xlabel="speed [m/s]", ylabel="friction coefficient", ylim=(0, None))
     friction.set_title("dashed: without heat", fontsize="medium")
     temperature.set(xlabel="speed [m/s]", ylabel="temperature of the contact [°C]")
@@ -82,7 +84,7 @@ def main(figure="tyre_on_asphalt.png", speeds=SPEEDS):
     ds = warm[20]
     parts = ds.friction_of_waves.transpose("wavelength", "speed").values
     ends = zip(ds.shortest_wavelength.values, ds.longest_wavelength.values, strict=True)
-    names = [f"{micrometres(low)} to {micrometres(high)} µm" for low, high in ends]
+    names = [range_text(low, high) for low, high in ends]
     shades = colormaps["cividis"](np.linspace(0, 1, len(names)))
     waves.stackplot(speeds, parts, labels=names, colors=shades)
     waves.set(xscale="log", xlabel="speed [m/s]", ylabel="contribution to friction", xlim=(speeds[0], speeds[-1]))
@@ -100,9 +102,10 @@ def main(figure="tyre_on_asphalt.png", speeds=SPEEDS):
     return fig
 
 
-def micrometres(length):
-    """Return a length with two digits. [um]"""
-    return f"{float(f'{1e6 * length:.2g}'):g}"
+def range_text(low, high):
+    """Return two lengths [m] with two digits, as text."""
+    factor, unit = (1e3, "mm") if high > 1e-3 else (1e6, "µm")
+    return "{:g} to {:g} {}".format(*(float(f"{factor * length:.2g}") for length in (low, high)), unit)
 
 
 if __name__ == "__main__":

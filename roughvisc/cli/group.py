@@ -6,8 +6,10 @@ import errno
 import io
 import logging
 import os
+import shutil
 import signal
 import sys
+import textwrap
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -55,7 +57,12 @@ class Failure(click.ClickException):
 
 def complain(message: str) -> None:
     """Write one message to the standard error stream."""
-    click.echo(f"roughvisc: {printable(message)}", err=True)
+    text = f"roughvisc: {printable(message)}"
+    if sys.stderr.isatty():
+        width = max(20, shutil.get_terminal_size().columns)
+        fill = textwrap.TextWrapper(width, break_long_words=False, break_on_hyphens=False)
+        text = "\n".join(fill.fill(line) for line in text.split("\n"))
+    click.echo(text, err=True)
 
 
 def screen(quiet: bool = False) -> Console:

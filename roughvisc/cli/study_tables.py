@@ -193,7 +193,8 @@ def _case_table(costs: xr.Dataset) -> Any:
         numbers = ["cannot run"] if row["refusal"] != "" else [text and mark + text for text in known]
         rows.append([*(value_text(key, row[key].item()) for key in varied), *numbers])
     names = [f"{name[:1].lower()}{name[1:]}" for name in names_of(varied).values()]
-    return columns([*names, *(name.replace("_", " ") for name in _COSTS)], rows)
+    headings = [name.replace(" ", "\n").replace("_", "\n") for name in [*names, *_COSTS]]  # fits into 80 columns
+    return columns(headings, rows)
 
 
 def _estimate(value: float, unit: str) -> str:

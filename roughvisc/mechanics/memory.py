@@ -163,7 +163,7 @@ class Memory:
         #: Shortest age at which the error of the series is known [s], and error below it, see :func:`early_error`.
         self.shortest = 0.0
         self.early = 0.0
-        terms = [f"{count} exponential{'s' * (count > 1)}"] * (count > 0) + ["a fluidity"] * (series.fluidity > 0)
+        terms = [f"{count} exponential{'s' * (count > 1)}"] * (count > 0) + ["viscous flow"] * (series.fluidity > 0)
         self.note = " and ".join(terms) or "no memory: elastic"
         self.may_ring = self.grows(duration, STIFF)
 

@@ -123,7 +123,8 @@ def _draw_history(ax: Axes, name: str, steps: xr.Dataset | None, kept: xr.Datase
     if steps is not None:
         ax.plot(across(steps[over]), unit(line), color=colour, label="time steps" if is_finer else None)
     if values.size <= _DOTS or steps is None:
-        label_of_dots = "kept times" if is_finer or steps is None else None
+        unnamed = "computed" if f"persson_{name}" in kept else None
+        label_of_dots = "kept times" if is_finer or steps is None else unnamed
         ax.plot(at, unit(values), "o", color=colour, label=label_of_dots)
     error = error_of(kept, name)
     if error is not None and float(error.max()) > _VISIBLE * float(abs(values).max()):

@@ -38,14 +38,14 @@ def waves(dataset: xr.Dataset) -> Figure:
 
     See Also
     --------
-    roughvisc.friction_theory, roughvisc.Heating
+    friction : Draw friction and contact fraction over speed.
 
     Examples
     --------
     >>> import roughvisc as rv
-    >>> road = rv.psd_table([1e3, 1e4, 1e6], [1e-17, 1e-17, 1e-24], convention="persson")
-    >>> rubber = rv.zener(shear_modulus=1e8, kelvin_modulus=1e6, kelvin_viscosity=10.0)
-    >>> ds = rv.friction_theory(road, rubber, speeds=[1e-3, 0.1, 10.0], pressure="0.3 MPa")
+    >>> rough = rv.self_affine("1 mm", 32, hurst=0.8, rms_slope=0.2, seed=1)
+    >>> settings = {"pressure": "0.1 MPa", "speeds": ["1 mm/s", "0.1 m/s"]}
+    >>> ds = rv.friction_theory(rough, rv.zener(3e6, 1e6, 1e3), **settings)
     >>> len(rv.plot.waves(ds).axes)
     1
     """
@@ -55,13 +55,13 @@ def waves(dataset: xr.Dataset) -> Figure:
     figure, axes = style.new_panels(panels, panels, (3.2, 2.6), left=0.75)
     chosen = np.unique(np.linspace(0, dataset.sizes["speed"] - 1, _SPEEDS).round().astype(int))
     colours = colormaps[_COLOURS](np.linspace(0, 0.9, chosen.size))
-    for row, colour in zip(chosen, colours, strict=True):
+    for row, colour, look in zip(chosen, colours, style.distinct(chosen.size), strict=True):
         result = dataset.isel(speed=row)
         label = format_quantity(float(f"{float(result['speed']):.3g}"), "m/s")
         lengths = result["wavelength"]
-        axes[0].plot(lengths, result["friction_of_waves"], "o-", color=colour, label=label)
+        axes[0].plot(lengths, result["friction_of_waves"], color=colour, label=label, **look)
         if panels == 2:
-            axes[1].plot(lengths, result["temperature_of_waves"] - 273.15, "o-", color=colour)
+            axes[1].plot(lengths, result["temperature_of_waves"] - 273.15, color=colour, **look)
     axes[0].set_ylabel("friction of a decade of waves")
     axes[0].set_ylim(bottom=0)
     axes[0].legend(title="speed")

@@ -13,7 +13,7 @@ from rich.console import Console
 from roughvisc.progress import Bars, clock
 from roughvisc.runs.run import Outcome
 from roughvisc.study.case import Case
-from roughvisc.study.case_text import value_text
+from roughvisc.study.case_text import short_words
 
 #: Longest text of the varied values of a case.
 _LONGEST = 60
@@ -47,7 +47,7 @@ class Display:
     def begin(self, cases: Sequence[Case], numbers: Mapping[str, int]) -> None:
         """Show the cases, in the order of the study; `numbers` gives the number of each key."""
         for case in cases:
-            varied = ", ".join(value_text(name, value) for name, value in case.varied.items())
+            varied = short_words(case.varied)
             self._names[case.key] = f"case {numbers[case.key]}" + (f" ({varied[:_LONGEST]})" if varied else "")
             self._at[case.key] = case.experiment.progress
         self._bars.start()

@@ -69,6 +69,8 @@ def unreadable(path: Path, error: Exception, what: str = "") -> InputError:
                 cause = "is not a NetCDF file"
     except OSError as failure:
         cause = cause_of_system(failure)
+    if cause and path.suffix == ".toml":
+        return unusable(path, "is a study", f"a result, such as those that roughvisc run writes to results/{path.stem}")
     if cause:
         return unusable(path, cause)
     reason = f"{what}{error}"

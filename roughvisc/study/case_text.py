@@ -8,6 +8,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import PurePath
 from typing import Any
 
@@ -87,12 +88,44 @@ def value_text(key: str, value: Any) -> str:
     --------
     >>> value_text("program.0.load", 2e-3), value_text("surface.file", "scans/a.sur")
     ('2 mN', 'a.sur')
+    >>> value_text("keep.times", [0.13, 0.5]), value_text("surface.shape", [16, 32])
+    ('130, 500 ms', '16 x 32 cells')
     """
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    if isinstance(value, str) and value.startswith("["):  # a list, as a coordinate of a sweep holds it
+        with suppress(ValueError):
+            value = json.loads(value)
+    name = key.rpartition(".")[2]
+    if isinstance(value, list | tuple) and value and all(map(_is_number, value)):
+        if name in ("shape", "resample"):
+            return " x ".join(map(str, value)) + " cells"
+        unit = unit_for(value, "s" if key == "keep.times" else unit_of(key))
+        return f"{', '.join(f'{one / unit.factor:.4g}' for one in value)} {unit.symbol}".rstrip()
+    if not _is_number(value):
         text = value if isinstance(value, str) else json.dumps(value)
-        return PurePath(text).name if key.rpartition(".")[2] == "file" else text
+        return PurePath(text).name if name == "file" else text
     # only the thickness may be infinite
     return "half-space" if value == math.inf else unit_for([value], unit_of(key)).text(value, 4)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def short_words(varied: Mapping[str, Any]) -> str:
+    """Return varied values [SI] in few words: a value with a unit without its name.
+
+    Examples
+    --------
+    >>> short_words({"program.0.load": 2.0, "solve.tolerance": 1e-2, "surface.resample": [16, 16]})
+    '2 N, tolerance 0.01, 16 x 16 cells'
+    """
+    names = names_of(list(varied))
+    parts = []
+    for key, value in varied.items():
+        text = value_text(key, value)
+        has_unit = unit_of(key) not in ("", "1") or text.endswith(" cells")
+        parts.append(text if has_unit else f"{names[key][:1].lower()}{names[key][1:]} {text}")
+    return ", ".join(parts)
 
 
 def case_words(case: Mapping[str, Any]) -> str:

@@ -55,7 +55,7 @@ from roughvisc.topography.conditioning import STEPS
 from roughvisc.topography.framing import combine
 from roughvisc.topography.recipes import RECIPES
 from roughvisc.topography.scans import check_surface, open_scan, surface_boundary
-from roughvisc.units import number
+from roughvisc.units import format_quantity, number
 
 log = logging.getLogger("roughvisc")
 
@@ -280,7 +280,9 @@ def speeds_of(where: str, stated: Any) -> list[float]:
     if not suits(count, int) or not 2 <= count <= _MOST_SPEEDS:
         raise InputError(key=f"{where}.count", found=count, expected=f"a whole number from 2 to {_MOST_SPEEDS}")
     if not first < last:
-        raise InputError(key=f"{where}.from", found=stated["from"], expected=f"a speed below {last:g} m/s")
+        raise InputError(
+            key=f"{where}.from", found=stated["from"], expected=f"a speed below {format_quantity(last, 'm/s')}"
+        )
     return [float(f"{speed:.12g}") for speed in np.geomspace(first, last, count)]
 
 

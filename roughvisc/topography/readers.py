@@ -126,7 +126,8 @@ def _labelled(file: ScanFile, channel: Channel, given: Mapping[str, Any]) -> xr.
             side = format_quantity(d, "m")
             found = f"it is {width} wide along {axis} at a spacing of {side}, which is not plausible"
             expected = "another unit or spacing, and height_scale if its heights are in another unit too"
-            raise InputError(f"{found} (at most {WIDEST:g} m, at least {FINEST:g} m): expected {expected}")
+            found += f" (at most {format_quantity(WIDEST, 'm')}, at least {format_quantity(FINEST, 'm')})"
+            raise InputError(f"{found}: expected {expected}")
     finite(h, HIGHEST)
     return h
 
@@ -292,7 +293,8 @@ def finite(h: xr.DataArray, highest: float = FARTHEST) -> None:
         raise InputError(f"all {h.size} points are missing: expected heights")
     beyond = h.values[np.abs(h.values) > (highest if h.size >= _FEWEST else FARTHEST)]
     if beyond.size:
-        found = f"{beyond.size} heights are like {beyond[0]:.6g} m, which is not plausible (at most {highest:g} m)"
+        found = f"{beyond.size} heights are like {format_quantity(beyond[0], 'm')}, which is not plausible"
+        found += f" (at most {format_quantity(highest, 'm')})"
         expected = "height_scale = 1e-6, or another factor, if they are in another unit than stated; "
         expected += "no_data = the number in the file, or NaN in an array, if it marks missing points"
         raise InputError(f"{found}: expected {expected}", key="heights")

@@ -215,3 +215,7 @@ def test_picture__is_not_a_damaged_result(tmp_path):
         open_result(path)
     assert not isinstance(error.value, DamagedError)
     assert (error.value.key, error.value.found) == (str(path), "is not a NetCDF file")
+    study = path.rename(tmp_path / "contact.toml")
+    with pytest.raises(InputError) as error:
+        open_result(study)
+    assert (error.value.key, error.value.found) == (str(study), "is a study")

@@ -2,7 +2,7 @@
 
 import re
 
-from roughvisc.study.case_text import case_words, file_stems
+from roughvisc.study.case_text import case_words, file_stems, short_words, value_text
 
 
 def case(**varied):
@@ -16,6 +16,9 @@ def test_case_words__are_what_the_study_says():
         "File Plate 3.sur, tolerance 0.001"
     )
     assert case_words({}) == ""
+    assert short_words({"program.0.load": 2.0, "surface.resample": [16, 24]}) == "2 N, 16 x 24 cells"
+    assert short_words({"keep.times": [0.13], "solve.boundary": "mirror"}) == "times 130 ms, boundary mirror"
+    assert value_text("keep.times", "[0.1, 2.0]") == value_text("keep.times", [0.1, 2.0]), "a coordinate of a sweep"
 
 
 def test_file_stems__are_safe_and_tell_cases_apart():
