@@ -208,7 +208,7 @@ def _case(job: tuple[Path | xr.Dataset, int, bool, bool]) -> dict[str, Any]:
         if is_shown and dataset.nbytes < _LOADED:
             dataset = dataset.load()  # otherwise each frame opens the file
         case = json.loads(dataset.attrs.get("case", "{}"))
-        title = str(case.get("title") or dataset.attrs.get("title") or f"case {number}")
+        title = style.title_of(dataset, case, number)
         facts = {"title": title, "name": case_words(case) or title, "key": str(dataset.attrs.get("case_key", ""))}
         facts["cells"] = _cells(dataset)
         return facts | (_details(dataset, case, number, is_drawn) if is_shown else {})

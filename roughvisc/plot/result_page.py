@@ -251,7 +251,7 @@ def _case(dataset: xr.Dataset, number: int, thinning: _Thinning) -> dict[str, An
     if dataset.nbytes <= _IN_MEMORY:
         dataset = dataset.load()
     study = json.loads(dataset.attrs.get("case", "{}"))
-    title = str(study.get("title") or dataset.attrs.get("title") or f"case {number}")
+    title = style.title_of(dataset, study, number)
     texts = varied_texts(study)
     names = names_of(list(texts))
     rows = np.unique(np.linspace(0, dataset.sizes[axis] - 1, min(thinning.rows, dataset.sizes[axis])).round())

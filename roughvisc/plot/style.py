@@ -218,6 +218,13 @@ def value_axis(ax: Axes, values: Any, unit: Unit, *, may_vanish: bool = False) -
         ax.autoscale_view(scalex=False)
 
 
+def title_of(dataset: xr.Dataset, case: Mapping[str, Any], number: int) -> str:
+    """Return the title of a result: the one of its study, or else its program, or else its number."""
+    program = str(dataset.attrs.get("program", ""))
+    title = case.get("title") or dataset.attrs.get("title") or program[:1].upper() + program[1:]
+    return str(title or f"case {number}")
+
+
 def described(variable: xr.DataArray) -> tuple[str, str]:
     """Return the label and the SI unit of a variable, as declared or from its attributes."""
     if declared := VARIABLES.get(str(variable.name)):
