@@ -158,7 +158,7 @@ VARIABLES: dict[str, Variable] = {
         _STEPS,
         "Pa",
         "nominal pressure",
-        "force over the area of all cells, absent ones too",
+        "force over the area of the given surface, absent cells too",
         table="value",
         is_of_steps=True,
     ),
