@@ -46,7 +46,7 @@ def off(material, rows=slice(None)):
 
 
 def test_shift_factors__are_found_within_their_stated_deviation():
-    found = [made(measured(rng=np.random.default_rng(seed))).thermal.shift.__self__ for seed in range(31, 37)]
+    found = [made(measured(rng=np.random.default_rng(seed))).thermal.shift.__self__ for seed in range(6)]
     errors = np.array([one.log_shift - (log_shift(LEVELS) - log_shift(one.reference_temperature)) for one in found])
     assert np.abs(errors).max() < 0.03
     within = np.abs(errors) <= 2 * np.array([one.sigma for one in found]) + 1e-12
