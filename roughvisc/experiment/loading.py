@@ -57,7 +57,7 @@ Array = NDArray[np.float64]
 CHOSEN = 0.5
 #: Largest ratio of :func:`jump_ratio`. At 0.8 the pull-off of a sphere is 1.4 % off, at 3 it is 15 %.
 LARGEST_RATIO = 1.0
-#: Gap at the border of a free surface, in ranges, below which attraction beyond the border is missed.
+#: The attraction beyond the border of a free surface is missed if the gap at the border is below this, in ranges.
 FELT = 5.0
 #: Times whose squares and products stay far from overflow. [s]
 LARGEST = 1e100

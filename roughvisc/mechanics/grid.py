@@ -186,9 +186,9 @@ class Grid:
 
     def on(self, shape: tuple[int, int]) -> Grid:
         """Return a grid of the same body, boundary and extent with another number of cells."""
-        (nx, ny) = self.shape
-        (mx, my) = shape
-        (dx, dy) = self.spacing
+        nx, ny = self.shape
+        mx, my = shape
+        dx, dy = self.spacing
         return Grid(shape, (dx * (nx / mx), dy * (ny / my)), self.boundary, kernel=self.kernel, xp=self.xp)
 
     @cached_property
@@ -263,7 +263,7 @@ class Grid:
             spectrum *= symbol
             return fft.waves_back(spectrum, points)
         # Zeros are not transformed along y. Blocks of rows and of columns stay in the cache, each on one thread.
-        (nx, ny) = self.shape
+        nx, ny = self.shape
         count = points[1] // 2 + 1
         fft = self._block_transforms
         threads = self._transforms.threads

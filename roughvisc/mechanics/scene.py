@@ -115,7 +115,7 @@ class Scene:
 
     @property
     def least_force(self) -> float:
-        """Force to which errors are relative at least: with adhesion the largest tension of a cell. [N]"""
+        """Smallest force that relative errors are divided by: with adhesion the largest tension of a cell. [N]"""
         return 1e-300 if self.adhesion is None else self.adhesion.strength * self.grid.cell_area
 
     def contact_pressure(self, point: Point, pressure: Array) -> Array:

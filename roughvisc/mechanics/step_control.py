@@ -164,7 +164,7 @@ def pair_ends(scene: Scene, number: int, now: float, length: float, *, is_first:
     that long, and kept times are the middle or the end of pairs.
     """
     segment = scene.program.segments[number]
-    (began, end) = scene.program.corners[number : number + 2]
+    began, end = scene.program.corners[number : number + 2]
     if scene.time_step is not None:
         longest = scene.time_step * (1 + ROUNDED)  # up to rounding
         event = min(scene.next_kept(now), end)
@@ -228,7 +228,7 @@ def errors_over_allowed(
     approach = max(largest[1], abs(pair.first.approach), abs(second.approach), rounding / scene.grid.cell_area, 1e-300)
 
     row = 0.0
-    (stated, of_approach) = stated_parts(scene)
+    stated, of_approach = stated_parts(scene)
     if lands and scene.keeps(second.time) and taken > FIRST_PAIR * (second.time - scene.program.corners[number]):
         of_pressure = max(error.pressure / stated, error.pressure + shared) / force
         row = max(of_pressure, error.approach / of_approach / approach) / scene.tolerance

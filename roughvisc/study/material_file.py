@@ -162,7 +162,7 @@ def _export(description: Mapping[str, Any], table: Mapping[str, Any]) -> Export:
 
 
 def _arguments(model: str, table: Mapping[str, Any], export: Export) -> dict[str, Any]:
-    """Return a table with the columns of an export instead of its file."""
+    """Return a material's table in which the columns of an export replace the name of its file."""
     columns = dict(export.columns)
     if "tan_delta" in columns:
         columns["loss"] = columns["storage"] * columns.pop("tan_delta")

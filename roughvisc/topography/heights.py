@@ -36,7 +36,7 @@ def digest_in(name: str) -> str:
 
 
 def file_name(h: xr.DataArray) -> str:
-    """Return the name of the file of heights from :func:`plain_heights`."""
+    """Return the name of the file that stores heights; `h` is from :func:`plain_heights`."""
     if _KNOWN not in h.encoding:
         h.encoding[_KNOWN] = digest_of(h)
     return f"heights-{h.encoding[_KNOWN]}.nc"
@@ -80,7 +80,7 @@ def plain_heights(heights: Any) -> xr.DataArray:
 
 
 def write_heights(h: xr.DataArray, folder: Path) -> Path:
-    """Write heights from :func:`plain_heights` to their file in a folder, unless it exists, and return its path."""
+    """Return the path of the file of heights in a folder, and write it unless it exists; see :func:`plain_heights`."""
     path = folder.absolute() / file_name(h)
     if not path.is_file():
         packed: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True, "fletcher32": True}

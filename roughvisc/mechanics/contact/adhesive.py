@@ -282,8 +282,8 @@ def solve_adhesive(
         if error <= tolerance or decrement <= 1e-26 * total:
             break
         if iteration == max_iterations:
-            reached = f"{error:.2g} after {iteration} iterations, expected {tolerance:.2g}"
-            raise ConvergenceError(f"the adhesive contact is not solved: error {reached}")
+            reached = f"{error:.2g} after {iteration} iterations: expected at most {tolerance:.2g}"
+            raise ConvergenceError(f"the adhesive contact is not solved: found an error of {reached}")
         lowest, stalled = (decrement, 0) if decrement < lowest / 2 else (lowest, stalled + 1)
 
         direction = conjugate(body, step, state, last)
@@ -338,7 +338,7 @@ def first_guess(
     peak: float,
     reach: float,
 ) -> tuple[Array, Array, float]:
-    """Return the heights of the gap without displacement, the gap of the given state, and the approach."""
+    """Return the undeformed gap at zero approach, the first guess of the gap, and the approach, all in ranges."""
     grid = body.grid
     cells = body.cells
     xp = grid.xp

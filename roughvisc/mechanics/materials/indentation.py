@@ -86,7 +86,7 @@ class Indentation:
         return np.asarray(np.maximum(self.depth - contact, 0.0) ** self.exponent)
 
     def noise(self, contact: float) -> Array:
-        """Return the standard deviation of the force, plus the noise of the depth times the slope of the force. [N]
+        """Return the noise of the force and of the depth (times the slope of the force), as a root of squares. [N]
 
         Without the noise of the depth, a contact point with smaller slopes would be preferred.
         """
