@@ -89,6 +89,7 @@ SCRIPTS = {
     "measured_rolling": ["measured_and_computed.py", "rolling"],
     "measured_cell": ["measured_and_computed.py", "cell"],
     "measured_brain": ["measured_and_computed.py", "brain"],
+    "measured_brain_retraction": ["measured_and_computed.py", "brain_retraction"],
     "measured_bead": ["measured_and_computed.py", "bead", "fmt-chiaro-txt_AEBP1_Indentation_002.txt"],
 }  # fmt: skip
 IN_THE_GALLERY = (

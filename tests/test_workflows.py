@@ -181,6 +181,9 @@ def test_records__are_computed_as_the_page_says(tmp_path, script):
     module = script("measured_and_computed")
     found = module.brain(tmp_path / "brain.png")
     assert found["searched"]["misfit"] < 3e-3
-    assert found["retraction"]["rms in hold [nN]"] < 0.05
+    retraction = module.brain_retraction()
+    assert retraction["without adhesion"]["rms in hold [nN]"] < 0.05
+    with_adhesion = list(retraction.values())[-1]
+    assert with_adhesion["least force [nN]"] == pytest.approx(retraction["least force, measured [nN]"], rel=0.01)
     for choice in list(module.cell(tmp_path / "cell.png").values())[1:]:
         assert choice["rms in predicted hold [nN]"] < 10

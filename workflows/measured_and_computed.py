@@ -3,6 +3,7 @@
     python workflows/measured_and_computed.py rolling [FIGURE]
     python workflows/measured_and_computed.py cell [FIGURE]
     python workflows/measured_and_computed.py brain [FIGURE]
+    python workflows/measured_and_computed.py brain_retraction [FIGURE]
     python workflows/measured_and_computed.py bead EXPORT [FIGURE]
     python workflows/measured_and_computed.py challenge SURFACE [SHA256]
 
@@ -24,6 +25,9 @@ import roughvisc as rv
 plt.style.use("roughvisc.plot.roughvisc")
 logging.getLogger("roughvisc").setLevel(logging.ERROR)  # the warnings of slopes are part of the page
 RECORDS = Path(__file__).parent / "records"
+#: Range of the attraction between bead and tissue [m], the shortest that the cells resolve, and segments of the record.
+REACH_OF_TISSUE = 1.7e-6
+SEGMENTS = ("approach", "hold", "retract")
 #: Coarse settings: the error of a record is larger than 1 %.
 SETTINGS = {"boundary": "free", "tolerance": 1e-2, "fields": (), "grid_error": False, "progress": False}
 
@@ -153,26 +157,45 @@ def brain(figure=None):
         axes.text(5.25, 31.75, "predicted", ha="center")
         axes.legend(loc="lower right")
         fig.savefig(figure, dpi=200)
-    return {"measured creep in the rest of the hold [nm]": 1e9 * creep, **rows, "retraction": brain_retraction()}
+    return {"measured creep in the rest of the hold [nm]": 1e9 * creep, **rows}
 
 
-def brain_retraction(body_of=lambda material: material):
-    """The recorded depth through the retraction: force in each segment, measured and computed.
+def brain_retraction(figure=None):
+    """The recorded depth through the retraction: force, measured and computed, without and with adhesion.
 
-    ``body_of(material)`` returns the body of the fitted material. Without adhesion it is the material itself. A body
-    with adhesion, which has one more number, is compared by the same lines.
+    The work of adhesion is the one that gives the measured pull-off; its range is the shortest that the cells resolve.
     """
     record, bead = brain_record()
     fit = rv.fit_material(record, bead)
     start = fit.contact_time(record)
     program = fit.program(record)
     times = np.linspace(0.05, program.duration, 60)
-    ds = rv.simulate(bead, body_of(fit.material), program, times=list(times), **SETTINGS)
     measured = record.force.interp(time=times + start).values
     segment = record.segment.sel(time=times + start, method="nearest").values
-    deviation = 1e9 * (ds.force.values - measured)
-    rms = {f"rms in {name} [nN]": np.sqrt(np.mean(deviation[segment == name] ** 2)) for name in np.unique(segment)}
-    return rms | {"least force, measured and computed [nN]": [1e9 * measured.min(), 1e9 * float(ds.force.min())]}
+
+    def computed(work):
+        sticky = rv.adhesion(work=work, range=REACH_OF_TISSUE) if work else None
+        return rv.simulate(bead, fit.material, program, times=list(times), adhesion=sticky, **SETTINGS)
+
+    work = 5e-5  # the pull-off is nearly proportional to it
+    for _ in range(2):
+        work *= measured.min() / float(computed(work).force.min())
+    runs = {"without adhesion": computed(None), f"{1e6 * work:.0f} µJ/m²": computed(work)}
+    rows = {"least force, measured [nN]": 1e9 * measured.min(), "at [s]": times[measured.argmin()]}
+    for name, ds in runs.items():
+        deviation = 1e9 * (ds.force.values - measured)
+        rows[name] = {f"rms in {one} [nN]": np.sqrt(np.mean(deviation[segment == one] ** 2)) for one in SEGMENTS}
+        rows[name] |= {"least force [nN]": 1e9 * float(ds.force.min()), "at [s]": times[int(ds.force.values.argmin())]}
+    if figure:
+        fig, axes = plt.subplots(figsize=(4.6, 2.8), layout="constrained")
+        axes.plot(record.time - start, 1e9 * record.force, color="0.5", label="measured")
+        for line, marker, (name, ds) in zip(("--", "-"), "os", runs.items(), strict=True):
+            axes.plot(ds.time, 1e9 * ds.force, line, marker=marker, markersize=3, label=f"computed, {name}")
+        axes.axhline(0, color="0.8", zorder=0)
+        axes.set(xlabel="Time since first contact [s]", ylabel="Force [nN]", xlim=(-0.2, times[-1]))
+        axes.legend(loc="lower left")
+        fig.savefig(figure, dpi=200)
+    return rows
 
 
 def bead(export, figure=None):
@@ -228,7 +251,7 @@ def _rounded(value):
 
 
 if __name__ == "__main__":
-    commands = {one.__name__: one for one in (rolling, cell, brain, bead, challenge)}
+    commands = {one.__name__: one for one in (rolling, cell, brain, brain_retraction, bead, challenge)}
     if len(sys.argv) < 2 or sys.argv[1] not in commands:
         sys.exit(__doc__)
     print(json.dumps(_rounded(commands[sys.argv[1]](*sys.argv[2:])), indent=1))
