@@ -8,6 +8,7 @@ converts nominal pressures to loads on a known area.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, update_wrapper
@@ -555,6 +556,23 @@ class Program:
             control = segment.control
             flags.append(is_prescribed)
         return flags
+
+    @cached_property
+    def starts(self) -> list[float]:
+        """Value at the start of each segment, in N or m; NaN if the solution determines it."""
+        values = list[float]()
+        control = self.segments[0].control if self.segments else "load"
+        reached = 0.0
+        for index, segment in enumerate(self.segments):
+            values.append(reached if segment.control == control else math.nan)
+            control = segment.control
+            reached = self.prescribed(index, self.corners[index + 1], values[-1])
+        return values
+
+    def known(self, time: float) -> tuple[Control, float]:
+        """Return the control at a time [s], and the prescribed value [N or m]; NaN if the solution determines it."""
+        index = min(bisect_left(self.corners, time, 1), len(self.segments)) - 1
+        return self.segments[index].control, self.prescribed(index, time, self.starts[index])
 
     @cached_property
     def duration(self) -> float:

@@ -70,6 +70,8 @@ class Difference:
         Error of the friction force of a slide. [N]
     shared : float
         Further error of the pressure, in cells that have entered the contact, which both solutions share. [N]
+    gap : float
+        Error of the gap of a soft body. [m]
     """
 
     pressure: float = 0.0
@@ -79,6 +81,7 @@ class Difference:
     outside: float = 0.0
     friction: float = 0.0
     shared: float = 0.0
+    gap: float = 0.0
 
     def at_least(
         self, former: Difference, left: float, left_of_friction: float = 0.0, *, is_soft: bool = False
@@ -104,6 +107,7 @@ class Difference:
             approach=max(self.approach, LASTING * former.approach),
             friction=max(self.friction, max(left, left_of_friction) * former.friction),  # may be all shared
             shared=self.shared + left * former.shared,
+            gap=max(self.gap, LASTING * former.gap),
         )
 
     def or_larger(self, other: Difference, factor: float = 1.0) -> Difference:
@@ -118,7 +122,13 @@ def stated_parts(scene: Scene) -> tuple[float, float]:
 
 
 def difference(
-    scene: Scene, before: Point, fine: Point, coarse: Point, slide: Slide | None = None, *, is_kept: bool = False
+    scene: Scene,
+    before: Point,
+    fine: Point,
+    coarse: Point,
+    slide: Slide | None = None,
+    *,
+    is_kept: bool = False,
 ) -> Difference:
     """Return the stated errors of a fine solution, from its difference to the coarse solution at the same time.
 
@@ -149,20 +159,26 @@ def difference(
     if slide is not None:
         of_friction = abs(friction(scene, fine, slide) - friction(scene, coarse, slide))
         error = replace(error, friction=of_friction)
-    if not is_kept or (fine.is_open and coarse.is_open):
+    is_soft = scene.memory.grows(fine.time - before.time, SOFT)
+    if not (is_kept or is_soft) or (fine.is_open and coarse.is_open):
         return error
     gap = scene.gap + scene.memory.displacement(fine.history)[0] - fine.approach
     gap_of_coarse = scene.gap + scene.memory.displacement(coarse.history)[0] - coarse.approach
+    uncertain_gap = abs(gap - gap_of_coarse)
+    if is_soft:
+        error = replace(error, gap=float(uncertain_gap[scene.solid].max()) / 3)  # at second order
+    if not is_kept:
+        return error
     pressure = scene.contact_pressure(fine, pressure)
     other = scene.contact_pressure(coarse, other)
     contact = fine.contact
     inside = contact & (pressure <= abs(pressure - other))
-    outside = ~contact & (coarse.contact | (gap <= abs(gap - gap_of_coarse)))
+    outside = ~contact & (coarse.contact | (gap <= uncertain_gap))
     if scene.present is not None:
         outside &= scene.present
     cells = int(contact.sum())
     uncertain = 0.0
-    if cells and scene.memory.grows(fine.time - before.time, SOFT):
+    if cells and is_soft:
         uncertain = entering(scene, before, fine) + ENTERING * float(outside.sum()) * fine.size / cells
     return replace(
         error,
@@ -183,6 +199,29 @@ def entered_early(scene: Scene, before: Point, after: Point) -> float:
     """Return the error of the pressure of entered cells that both solutions of a pair share. [N]"""
     creep = scene.memory.compliance(after.time - before.time) / scene.memory.compliance(0.0) - 1
     return min(SHARED * creep**2, 1.0) * force_of_entered(scene, before, after)
+
+
+def unsettled(scene: Scene, before: Point, after: Point, error: float, former: tuple[float, float]) -> float:
+    """Return the error of the pressure of a soft body due to cells that may not have entered the contact yet. [N]
+
+    The pressure of a soft body jumps when a cell enters. The time of this jump is uncertain by the error of the gap, so
+    that the error lasts until the approach has changed by the error of the gap.
+
+    Parameters
+    ----------
+    scene : Scene
+        Input of the time stepping.
+    before, after : Point
+        Solution before a pair, and at a row of the pair.
+    error : float
+        Error of the gap. [m]
+    former : tuple of float
+        Force on the cells that have entered before the pair, and the approach at which they did. [N, m]
+    """
+    force = former[0] if abs(after.approach - former[1]) <= error else 0.0
+    if abs(after.approach - before.approach) <= error:
+        force += force_of_entered(scene, before, after)
+    return 2 * force  # other cells carry what these do not
 
 
 def force_of_entered(scene: Scene, before: Point, after: Point) -> float:

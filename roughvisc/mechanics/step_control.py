@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from roughvisc.mechanics.memory import LARGEST_GROWTH
 from roughvisc.mechanics.program import Segment
@@ -91,6 +92,25 @@ class Pair:
         return bool((self.start.contact & ~self.second.contact).any())
 
 
+class Sizes(NamedTuple):
+    """Forces and approaches to which the errors of a pair are relative.
+
+    Attributes
+    ----------
+    force, approach : float
+        Largest values of the kept rows so far; a given approach is the largest of all steps. [N, m]
+    largest : float
+        Largest force of all steps. [N]
+    peak : tuple of float
+        Force that is still the largest after relaxation, and the approach and the time then. [N, m, s]
+    """
+
+    force: float
+    approach: float
+    largest: float
+    peak: tuple[float, float, float]
+
+
 @dataclass(frozen=True)
 class Controller:
     """Choice between acceptance and repetition of a pair, and of the length to try next.
@@ -99,15 +119,22 @@ class Controller:
     ----------
     shortest : float
         Pairs that are not longer are accepted. [s]
+    growth : float
+        Largest growth of the next pair. After a pair that was refused at first it is small: of the pairs of a
+        relaxation every second one was refused.
     refused : float
         Added error of the last refused trial of this pair, over the allowed error.
     refused_at_row : float
         Error of this trial at its kept row, over the tolerance.
+    tried : float
+        Length of the longest refused trial. [s]
     """
 
     shortest: float
+    growth: float = GROW
     refused: float = math.inf
     refused_at_row: float = math.inf
+    tried: float = 0.0
 
     def judge(
         self, taken: float, ratio: float, at_row: float, *, opens: bool, is_stiff: bool
@@ -131,13 +158,16 @@ class Controller:
         is_too_long = REJECTED < ratio < self.refused
         misses = 1 < at_row < self.refused_at_row and ratio > 1  # shorter steps reduce no error from before the pair
         if taken > self.shortest:
+            refused = replace(self, refused=ratio, tried=max(self.tried, taken))
             if opens:
                 return self, SHRINK * taken
             if is_too_long:
-                return replace(self, refused=ratio), taken * max(factor, SHRINK)
+                return refused, taken * max(factor, SHRINK)
             if misses:
-                return replace(self, refused=ratio, refused_at_row=at_row), 0.5 * taken
-        largest = LARGEST_GROWTH / (1 + SLACK) if is_stiff else GROW
+                return replace(refused, refused_at_row=at_row), 0.5 * taken
+        largest = min(LARGEST_GROWTH / (1 + SLACK) if is_stiff else GROW, self.growth)
+        if self.refused <= ratio:  # the error does not depend on the length, and the next pair need not be as short
+            return None, self.tried
         if self.refused < math.inf:  # after a refused trial steps do not grow (Hairer, Norsett, Wanner I, section II.4)
             largest = 1.0
         return None, taken * min(max(factor, SHRINK), largest)
@@ -194,7 +224,7 @@ def errors_over_allowed(
     number: int,
     error: Difference,
     shared: float,
-    largest: tuple[float, float],
+    sizes: Sizes,
     *,
     lands: bool,
 ) -> tuple[float, float]:
@@ -215,17 +245,19 @@ def errors_over_allowed(
         Stated error at the end of the pair.
     shared : float
         Error of the pressure that both solutions share. [N]
-    largest : tuple of float
-        Largest force and approach of the kept rows so far; a given approach is the largest of all steps. [N, m]
+    sizes : Sizes
+        Forces and approaches until the pair.
     lands : bool
         Whether the pair contains a kept row.
     """
     second = pair.second
     taken = pair.length
     memory = scene.memory
-    force = max(largest[0], pair.first.size, second.size, scene.least_force)
+    force = max(sizes.force, pair.first.size, second.size, scene.least_force)
     rounding = ROUNDING * memory.compliance(second.time) * scene.grid.largest_eigenvalue * force / scene.gap.size
-    approach = max(largest[1], abs(pair.first.approach), abs(second.approach), rounding / scene.grid.cell_area, 1e-300)
+    approach = max(
+        sizes.approach, abs(pair.first.approach), abs(second.approach), rounding / scene.grid.cell_area, 1e-300
+    )
 
     row = 0.0
     stated, of_approach = stated_parts(scene)
@@ -235,9 +267,52 @@ def errors_over_allowed(
 
     following = second.time if lands else min(scene.next_kept(second.time), scene.program.duration)
     ahead = growth_until(scene, number, second, following)
-    scales = max(force, second.size * ahead), max(approach, abs(second.approach) * ahead**0.5)
+    expected = 0.0 if lands else expected_force(scene, pair, following, sizes)
+    scales = max(force, second.size * ahead, expected), max(approach, abs(second.approach) * ahead**0.5)
     allowed = ALLOWED_SOFT if scene.is_soft else ALLOWED
     return added(scene, pair, number, following, scales) / (allowed * scene.tolerance), row
+
+
+def expected_force(scene: Scene, pair: Pair, following: float, sizes: Sizes) -> float:
+    """Return the force to expect at the next kept time; zero if nothing is known of it. [N]
+
+    The force is the prescribed load. Under an approach that grows until then it is at least proportional to the
+    approach, and grows from the present force to the peak. If the surfaces are apart at the kept time, any error of
+    the pressure is gone then: the largest force of all steps is returned if this is sure, and the peak if the present
+    rates of force and approach lead to it.
+
+    Parameters
+    ----------
+    scene : Scene
+        Input of the time stepping.
+    pair : Pair
+        Both solutions.
+    following : float
+        Next kept time. [s]
+    sizes : Sizes
+        Forces and approaches until the pair.
+    """
+    point = pair.second
+    control, value = scene.program.known(following)
+    if math.isnan(value):
+        return 0.0
+    if control == "load":
+        return value or sizes.largest
+    touches = float(scene.gap[scene.solid].min())
+    if value <= touches:  # the undeformed surface is the highest
+        return sizes.largest
+    force, approach, then = sizes.peak
+    peak = force * scene.memory.remaining(point.time - then)
+    if value <= point.approach:
+        fallen = pair.start.size - point.size
+        receded = pair.start.approach - point.approach
+        parts = fallen > 0 and receded > 0 and point.size * receded <= fallen * (point.approach - value)
+        return peak if parts else 0.0
+    grown = point.size * (value - touches) / max(point.approach - touches, 1e-300)
+    if approach <= point.approach:
+        return grown
+    part = min((value - point.approach) / (approach - point.approach), 1.0)
+    return max(grown, point.size + part * max(peak - point.size, 0.0))
 
 
 def growth_until(scene: Scene, number: int, point: Point, following: float) -> float:

@@ -26,7 +26,7 @@ from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.mechanics.adhesive_step import GROWTH, JUMP, dissipated, longest_step, step_with_adhesion
 from roughvisc.mechanics.contact.adhesive import Unstable
 from roughvisc.mechanics.contact.solver import solve_contact
-from roughvisc.mechanics.memory import STIFF, Rule
+from roughvisc.mechanics.memory import LARGEST_GROWTH, STIFF, Rule
 from roughvisc.mechanics.program import Segment, Slide, instant
 from roughvisc.mechanics.scene import SOFT, Array, Packed, Point, Scene
 from roughvisc.mechanics.stated_error import (
@@ -36,12 +36,14 @@ from roughvisc.mechanics.stated_error import (
     difference,
     entered_early,
     entering,
+    force_of_entered,
     friction,
     left_of_friction,
     phase_error,
     skipped_friction,
     touch,
     transient_error,
+    unsettled,
     work_of_pair,
     work_of_step,
 )
@@ -52,6 +54,7 @@ from roughvisc.mechanics.step_control import (
     SHORTEST_PAIR,
     Controller,
     Pair,
+    Sizes,
     errors_over_allowed,
     first_length,
     pair_ends,
@@ -106,6 +109,12 @@ class State:
         Error of the work due to forces that relax within the first step after a corner: sum over all corners. [J]
     dissipated : float
         Energy that jumps of an elastic body with adhesion have dissipated so far. [J]
+    peak : tuple of float
+        Force that is still the largest after relaxation, and the approach and the time then. [N, m, s]
+    growth : float
+        Largest ratio of the lengths of the next pair and of the last one.
+    entered : tuple of float
+        Force on the cells of a soft body that entered the contact last, and the approach at which they did. [N, m]
     distance : float
         Length of the path of the slides so far. [m]
     convolutions : int
@@ -127,6 +136,9 @@ class State:
     work_curved: float = 0.0
     work_relaxed: float = 0.0
     dissipated: float = 0.0
+    peak: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    growth: float = GROW
+    entered: tuple[float, float] = (0.0, 0.0)
     distance: float = 0.0
     convolutions: int = 0
 
@@ -388,9 +400,15 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
     length = state.next_length or first_length(scene, segment, jumped)
     if segment.amplitude:
         length = min(length, segment.period / PAIRS_OF_A_CYCLE)
-    controller: Controller | None = Controller(shortest_length(scene, number))
-    largest = state.kept_force, state.kept_approach if segment.control == "load" else state.largest_approach
-    while controller is not None:
+    controller = Controller(shortest_length(scene, number), state.growth)
+    by_load = segment.control == "load"
+    sizes = Sizes(
+        state.kept_force,
+        state.kept_approach if by_load else state.largest_approach,
+        state.largest_force,
+        state.peak,
+    )
+    while True:
         middle, last = pair_ends(scene, number, fine.time, length, is_first=not state.next_length)
         times = (last,) if scene.kept is None else scene.kept_within(fine.time, last)
         pair, at_end, coarse_at_end = solve_pair(scene, state, middle, last, has_row=bool(times))
@@ -401,15 +419,18 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         if scene.time_step is not None:
             break
         shared = error.shared + state.difference.shared * scene.memory.remaining(pair.length)
-        ratio, at_row = errors_over_allowed(scene, pair, number, error, shared, largest, lands=bool(times))
+        ratio, at_row = errors_over_allowed(scene, pair, number, error, shared, sizes, lands=bool(times))
         loses_contact = not fine.is_open and (pair.first.is_open or pair.second.is_open)
-        opens = segment.control == "approach" and loses_contact and pair.second.approach >= fine.approach
+        opens = not by_load and loses_contact and pair.second.approach >= fine.approach
         is_stiff = scene.memory.grows(GROW * pair.length, STIFF)
-        controller, length = controller.judge(pair.length, ratio, at_row, opens=opens, is_stiff=is_stiff)
-        if controller is not None:
-            del pair, at_end, coarse_at_end  # frees their memory while the pair is repeated
+        again, length = controller.judge(pair.length, ratio, at_row, opens=opens, is_stiff=is_stiff)
+        if again is None:
+            break
+        controller = again
+        del pair, at_end, coarse_at_end  # frees their memory while the pair is repeated
 
-    return accepted(scene, state, pair, at_end, times, error, length)
+    growth = LARGEST_GROWTH if controller.refused < math.inf else GROW
+    return accepted(scene, replace(state, growth=growth), pair, at_end, times, error, length)
 
 
 def solve_pair(scene: Scene, state: State, middle: float, last: float, *, has_row: bool) -> tuple[Pair, Point, Point]:
@@ -469,7 +490,18 @@ def accepted(
             error = replace(error, friction=max(error.friction, unresolved))
         return error.at_least(former, left, of_friction, is_soft=pair.is_soft)
 
+    def at_row(error: Difference, point: Point) -> Difference:
+        if not pair.is_soft:
+            return error
+        uncertain = unsettled(scene, fine, point, error.gap, state.entered)
+        return replace(error, shared=max(error.shared, uncertain))
+
     error = at_least(error, pair.second)
+    entered = state.entered
+    force = force_of_entered(scene, fine, pair.second) if pair.is_soft else 0.0
+    if force > 0:
+        earlier = entered[0] if abs(fine.approach - entered[1]) <= error.gap else 0.0
+        entered = (earlier + force, pair.second.approach)
 
     inside = [row_at_middle(scene, pair, number) if pair.first.time in times else pair.first]
     for time in times:
@@ -492,6 +524,7 @@ def accepted(
         work=state.work + works[-1],
         work_curved=math.hypot(state.work_curved, last_error),
         work_relaxed=state.work_relaxed + relaxing,
+        entered=entered,
     )
 
     steps = []
@@ -501,12 +534,13 @@ def accepted(
         uncertain = entering(scene, fine, point)
         uncertain = uncertain if pair.is_soft else max(uncertain, entered_early(scene, fine, point))
         between = at_least(replace(error.or_larger(former, left), shared=uncertain), point)
+        between = at_row(between, point)
         curved = math.hypot(state.work_curved, work_error if point.time <= pair.first.time else last_error)
         within = replace(
             state, work=state.work + work, work_curved=curved, work_difference=of_work, work_relaxed=after.work_relaxed
         )
         steps.append(Step(point, between, number, within, is_end=False))
-    return [*steps, Step(at_end, error, number, after)]
+    return [*steps, Step(at_end, at_row(error, at_end), number, after)]
 
 
 def row_at_middle(scene: Scene, pair: Pair, number: int) -> Point:
@@ -567,6 +601,10 @@ def after_steps(
     of_work = 0.0
     if coarse is not fine:
         of_work = work_of_step(scene, state.twice or state.fine, coarse) - work_of_step(scene, state.fine, fine)
+    peak = state.peak
+    for point in (points[0], fine):
+        if point.size > peak[0] * scene.memory.remaining(point.time - peak[2]):
+            peak = (point.size, point.approach, point.time)
     reached = replace(
         state,
         fine=fine,
@@ -576,6 +614,7 @@ def after_steps(
         largest_approach=max(state.largest_approach, abs(points[0].approach), abs(fine.approach)),
         solver_error=max(state.solver_error, *(point.solver_error for point in points), coarse.solver_error),
         work_difference=state.work_difference + of_work,
+        peak=peak,
         convolutions=scene.grid.convolutions,
         **totals,
     )

@@ -38,11 +38,13 @@ def random_contact(rng):
     return surface, material, program, sorted(rng.uniform(0, program.duration, 7))
 
 
-def errors_of_rows(surface, material, program, times, sharper):
+def errors_of_rows(surface, material, program, times, sharper, **options):
     """Return the true and the stated error of each row over the tolerance, against a run so many times sharper."""
     settings = {"boundary": "periodic", "fields": ("pressure",), "progress": False}
+    settings |= options
     result = rv.simulate(surface, material, program, times=times, tolerance=TOLERANCE, **settings)
     times = result.time.values.tolist()
+    settings.pop("numerics", None)
     exact = rv.simulate(surface, material, program, times=times, tolerance=TOLERANCE / sharper, **settings)
     return relative_errors(result, exact) / TOLERANCE, result.stated_error.values / TOLERANCE
 
@@ -69,23 +71,27 @@ def two_crests(lower):
 ROWS = ((np.arange(7) + 0.7) / 7).tolist()
 
 
-def errors_after_second_crest(lower, retardation_time, program, times):
+def errors_after_second_crest(lower, retardation_time, program, times, **options):
     material = rv.Prony(0.08, 0.0, (0.92,), (retardation_time,))
-    return errors_of_rows(two_crests(lower), material, program, times, sharper=30)
+    return errors_of_rows(two_crests(lower), material, program, times, sharper=30, **options)
 
 
-def test_second_crest_that_enters_just_before_a_row__states_its_uncertain_pressure():
+def test_second_crest_that_enters_within_a_step__states_its_uncertain_pressure():
     """Both solutions of the pair have about the same pressure on the new cells, and it is wrong.
 
-    The crest enters between 0.34 and 0.36 s; how long before the third row depends on the pairs of steps.
+    The crest enters at 0.442 s. Steps of a given length do not avoid the row.
     """
+    step = 0.04
     program = rv.Program().pressure(0.03, over=1.0)
-    errors = [
-        errors_after_second_crest(0.1, 1.0, program, ((np.arange(7) + shift) / 7).tolist()) for shift in (0.3, 0.5, 0.7)
-    ]
-    true, stated = np.array(errors).swapaxes(0, 1)
-    assert true.max() > 2
-    assert (stated[true > 1] > 1).all()
+    numerics = rv.Numerics(time_step=step)
+    true, stated = [], []
+    for row in 0.4422 + np.arange(8) * step / 4:
+        off, error = errors_after_second_crest(0.1, 1.0, program, [0.1, 0.2, float(row), 0.9], numerics=numerics)
+        true.append(off[2])
+        stated.append(error[2])
+    true, stated = np.array(true), np.array(stated)
+    assert true.max() > 0.5
+    assert (true <= 1.2 * stated).all()
 
 
 @pytest.mark.parametrize(
@@ -100,3 +106,18 @@ def test_second_crest_that_enters_just_before_a_row__states_its_uncertain_pressu
 def test_rows_after_a_second_crest_has_entered__keep_the_tolerance(lower, retardation_time, program, times):
     true, _ = errors_after_second_crest(lower, retardation_time, program, times)
     assert true.max() <= 1
+
+
+def test_rows_of_each_step_while_rings_enter_a_viscous_body__seldom_miss_the_jump_of_the_pressure():
+    """Without instantaneous compliance the pressure jumps when a ring of cells enters.
+
+    The computed time of the jump has an error. Between it and the true time the contact is another one, although the
+    approach is right within the tolerance. Without a statement 4 % of the rows are silent.
+    """
+    places = [(np.arange(count) + 0.5) / count - 0.5 for count in (18, 24)]
+    cone = rv.from_array(-0.1 * np.hypot(*np.meshgrid(*places, indexing="ij")), spacing=(1 / 18, 1 / 24))
+    body = rv.Prony(0.0, 0.0, (4e-6,), (190.0,), 0.4)
+    program = rv.Program().load(1.2e6, over=1.9)
+    true, stated = errors_of_rows(cone, body, program, None, sharper=30, boundary="free", edge="accept")
+    silent = (true > MARGIN) & (true > MARGIN * stated)
+    assert silent.mean() <= 0.01

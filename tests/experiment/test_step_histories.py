@@ -1,6 +1,7 @@
 """Histories at every accepted step beside fields at kept times, and where kept times lie."""
 
 import numpy as np
+import pytest
 
 import roughvisc as rv
 from roughvisc.experiment.kept_times import spread_times
@@ -39,3 +40,29 @@ def test_spread_times__of_a_hold_lie_evenly_in_the_logarithm():
     since = times[(times > 1e-9) & (times < 9.999)]
     ends = np.concatenate([[0.01], since, [10.0]])  # from a third of the ramp before it
     np.testing.assert_allclose(np.diff(np.log(ends)), np.diff(np.log(ends))[0])
+
+
+@pytest.mark.parametrize(
+    ("control", "high", "low"),
+    [
+        pytest.param("approach", 2e-5, -2e-5, id="opens"),
+        pytest.param("approach", 2e-5, 0.5e-5, id="opens_on_its_imprint"),
+        pytest.param("load", 0.5, 0.0, id="is_unloaded"),
+    ],
+)
+@pytest.mark.parametrize(
+    "body", [rv.zener(1e6, 1e6, 1e5), rv.Prony(1e-7, 5e-7, (1e-6,), (0.1,))], ids=["zener", "burgers"]
+)
+def test_one_kept_row__takes_no_more_steps_than_many_where_the_force_vanishes(body, control, high, low):
+    """Errors are relative to the force of kept rows; where it vanishes in between, no step has to resolve it."""
+    program = rv.Program()
+    for _ in range(4):
+        program = getattr(getattr(program, control)(high, over=0.1), control)(low, over=0.1)
+
+    def convolutions(rows):
+        times = (program.duration * np.arange(1, rows + 1) / rows).tolist()
+        ball = rv.sphere(1e-2, 2e-3, 16)
+        ds = rv.simulate(ball, body, program, times=times, fields=(), grid_error=False, progress=False)
+        return int(rv.observables.history(ds).convolutions.sum())
+
+    assert convolutions(1) < 2 * convolutions(40)
