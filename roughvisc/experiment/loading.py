@@ -39,7 +39,7 @@ from roughvisc.mechanics.grid import Grid, arrays_of, to_host
 from roughvisc.mechanics.memory import History
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.scene import SOFT, Packed, Point, Scene
-from roughvisc.mechanics.stated_error import Difference
+from roughvisc.mechanics.stated_error import StepErrors
 from roughvisc.mechanics.stepping import State, Step, march
 from roughvisc.mechanics.tangential import tangential_force
 from roughvisc.settings import Settings, attraction
@@ -89,7 +89,7 @@ class LoadingState:
 
 
 #: Dataclasses in the state of a row, for checkpoints. Its other parts are plain values, tuples and arrays.
-STATES = (LoadingState, State, Point, Packed, History, Difference)
+STATES = (LoadingState, State, Point, Packed, History, StepErrors)
 
 
 @dataclass(frozen=True)

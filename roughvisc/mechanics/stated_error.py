@@ -1,12 +1,13 @@
 """Stated error of the time steps: the difference between two solutions, and what both share.
 
 The fine solution takes a pair of steps, the coarse solution takes the pair as one step. :func:`difference` states their
-difference, times a factor, as the error at the end of the pair. Both solutions may share an error:
+difference, times a factor, as the error at the end of the pair. The difference may miss an error:
 
-- the difference has parts of first and of second order and may pass through zero (:meth:`Difference.at_least`);
-- the pressure of a cell that has just entered the contact is uncertain (:func:`entering`, :func:`entered_early`);
+- it has parts of first and of second order and may pass through zero (:meth:`StepErrors.at_least`);
+- the pressure of a cell that has just entered the contact is uncertain (:func:`uncertain_force_of_entered`,
+  :func:`shared_error_of_entered`, :func:`error_of_late_entry`);
 - slow slides have a phase error at one and at two cells a step (:func:`phase_error`);
-- their first step misses the friction (:func:`skipped_friction`).
+- their first step misses friction and pressure (:func:`skipped_friction`, :func:`skipped_pressure`).
 
 The work of a pair is an integral over parabolas (:func:`work_of_pair`). Its error is the difference to straight lines,
 and after a corner of the program the part of the force that relaxes within a step.
@@ -35,13 +36,13 @@ STATED_SOFT = (1.0, 1.5)
 #: Least stated error after a pair, over the part of the error before the pair that relaxation leaves.
 LASTING = 0.5
 #: Uncertain part of the pressure of a cell that has just entered the contact, if the pressure is due to creep.
-ENTERED = 0.3
+UNCERTAIN_OF_ENTERED = 0.3
 #: Error of this pressure that both solutions of a pair may share, as a part of the pressure times the square of the
 #: creep in the pair over the instantaneous compliance; at most the pressure itself. Measured on random contacts of
 #: 2 x 40 cells with eight per cent instantaneous compliance, and of 21 x 16 cells with four.
 SHARED = 0.1
 #: Pressure of a cell that may have entered the contact of a soft body, over the mean pressure.
-ENTERING = 2.5
+PRESSURE_OF_LATE = 2.5
 #: Relative error of a quantity without a second solution. Used for the pressure change in a slide by one cell,
 #: and for the work of a force that vanishes at one end and is taken as linear over the approach. On a sphere the error
 #: is a fifth of this work, on a cone a third.
@@ -55,8 +56,8 @@ LEAST_PART = 0.1
 
 
 @dataclass(frozen=True)
-class Difference:
-    """Stated error of the time steps, from the difference between the fine and the coarse solution.
+class StepErrors:
+    """Stated errors of the time steps, from the difference between the fine and the coarse solution.
 
     Attributes
     ----------
@@ -69,7 +70,7 @@ class Difference:
     friction : float
         Error of the friction force of a slide. [N]
     shared : float
-        Further error of the pressure, in cells that have entered the contact, which both solutions share. [N]
+        Further error of the pressure that both solutions share: in cells that have entered, in slides by one cell. [N]
     gap : float
         Error of the gap of a soft body. [m]
     """
@@ -84,13 +85,13 @@ class Difference:
     gap: float = 0.0
 
     def at_least(
-        self, former: Difference, left: float, left_of_friction: float = 0.0, *, is_soft: bool = False
-    ) -> Difference:
+        self, former: StepErrors, left: float, left_of_friction: float = 0.0, *, is_soft: bool = False
+    ) -> StepErrors:
         """Return the errors, each at least a part of the error before a pair; both shared errors add up.
 
         Parameters
         ----------
-        former : Difference
+        former : StepErrors
             Errors before the pair.
         left : float
             Part of an error of the pressure that relaxation leaves until the end of the pair.
@@ -110,13 +111,13 @@ class Difference:
             gap=max(self.gap, LASTING * former.gap),
         )
 
-    def or_larger(self, other: Difference, factor: float = 1.0) -> Difference:
+    def or_larger(self, other: StepErrors, factor: float = 1.0) -> StepErrors:
         """Return the larger error of each kind, of this one and the other one times a factor."""
         larger = np.maximum(list(vars(self).values()), factor * np.array(list(vars(other).values())))
-        return Difference(*larger.tolist())
+        return StepErrors(*larger.tolist())
 
 
-def stated_parts(scene: Scene) -> tuple[float, float]:
+def stated_over_difference(scene: Scene) -> tuple[float, float]:
     """Return the stated error over the difference of both solutions: of pressure and force, and of the approach."""
     return STATED_SOFT if scene.is_soft else STATED
 
@@ -129,7 +130,7 @@ def difference(
     slide: Slide | None = None,
     *,
     is_kept: bool = False,
-) -> Difference:
+) -> StepErrors:
     """Return the stated errors of a fine solution, from its difference to the coarse solution at the same time.
 
     Parameters
@@ -146,12 +147,12 @@ def difference(
         Whether a kept row needs the uncertain area and the uncertain pressure of entering cells.
     """
     if fine is coarse:
-        return Difference()
+        return StepErrors()
     grid = scene.grid
-    stated, of_approach = stated_parts(scene)
+    stated, of_approach = stated_over_difference(scene)
     pressure = fine.pressure
     other = coarse.pressure
-    error = Difference(
+    error = StepErrors(
         pressure=stated * (float(abs(pressure - other).sum()) * grid.cell_area),
         force=stated * abs(fine.force - coarse.force),
         approach=of_approach * abs(fine.approach - coarse.approach),
@@ -166,7 +167,8 @@ def difference(
     gap_of_coarse = scene.gap + scene.memory.displacement(coarse.history)[0] - coarse.approach
     uncertain_gap = abs(gap - gap_of_coarse)
     if is_soft:
-        error = replace(error, gap=float(uncertain_gap[scene.solid].max()) / 3)  # at second order
+        # the difference is three times an error of second order, and the surface is smoother than the pressure
+        error = replace(error, gap=float(uncertain_gap[scene.solid].max()) / 3)
     if not is_kept:
         return error
     pressure = scene.contact_pressure(fine, pressure)
@@ -179,7 +181,10 @@ def difference(
     cells = int(contact.sum())
     uncertain = 0.0
     if cells and is_soft:
-        uncertain = entering(scene, before, fine) + ENTERING * float(outside.sum()) * fine.size / cells
+        uncertain = (
+            uncertain_force_of_entered(scene, before, fine)
+            + PRESSURE_OF_LATE * float(outside.sum()) * fine.size / cells
+        )
     return replace(
         error,
         pressure=error.pressure + uncertain,
@@ -188,24 +193,24 @@ def difference(
     )
 
 
-def entering(scene: Scene, before: Point, after: Point) -> float:
+def uncertain_force_of_entered(scene: Scene, before: Point, after: Point) -> float:
     """Return the uncertain force of cells that have entered between two points. [N]"""
     compliance = scene.memory.compliance(after.time - before.time)
     creeping = 1 - scene.memory.compliance(0.0) / compliance if compliance > 0 else 0.0
-    return ENTERED * creeping * force_of_entered(scene, before, after)
+    return UNCERTAIN_OF_ENTERED * creeping * force_of_entered(scene, before, after)
 
 
-def entered_early(scene: Scene, before: Point, after: Point) -> float:
+def shared_error_of_entered(scene: Scene, before: Point, after: Point) -> float:
     """Return the error of the pressure of entered cells that both solutions of a pair share. [N]"""
     creep = scene.memory.compliance(after.time - before.time) / scene.memory.compliance(0.0) - 1
     return min(SHARED * creep**2, 1.0) * force_of_entered(scene, before, after)
 
 
-def unsettled(scene: Scene, before: Point, after: Point, error: float, former: tuple[float, float]) -> float:
+def error_of_late_entry(scene: Scene, before: Point, after: Point, error: float, former: tuple[float, float]) -> float:
     """Return the error of the pressure of a soft body due to cells that may not have entered the contact yet. [N]
 
-    The pressure of a soft body jumps when a cell enters. The time of this jump is uncertain by the error of the gap, so
-    that the error lasts until the approach has changed by the error of the gap.
+    The pressure of a soft body jumps when a cell enters, which it may do at any approach within the error of the gap.
+    Until the approach has changed by more, a row may lie before the true jump.
 
     Parameters
     ----------
@@ -216,7 +221,7 @@ def unsettled(scene: Scene, before: Point, after: Point, error: float, former: t
     error : float
         Error of the gap. [m]
     former : tuple of float
-        Force on the cells that have entered before the pair, and the approach at which they did. [N, m]
+        Force on the cells that have entered before the pair within this error, and the approach then. [N, m]
     """
     force = former[0] if abs(after.approach - former[1]) <= error else 0.0
     if abs(after.approach - before.approach) <= error:
@@ -306,6 +311,21 @@ def skipped_friction(scene: Scene, before: Point, point: Point, slide: Slide, st
     missed = memory.compliance(step) - float(memory.crept(step)[0]) / step
     change = missed * (point.history.fields[0] - before.history.fields[0])
     return abs(tangential_force(scene.grid, point.pressure, change, slide))
+
+
+def skipped_pressure(scene: Scene, before: Point, point: Point, step: float) -> float:
+    """Return the error of the pressure after the first step of a slide, to which no step before it led. [N]
+
+    The pressure of a wave is not linear within a step that is longer than the relaxation. The error is at most the
+    change of the pressure times the part of the compliance that a linear pressure misses, as far as the step relaxes.
+    The parameters are those of :func:`skipped_friction`.
+    """
+    memory = scene.memory
+    if isinstance(memory, LayerMemory) or point.is_open:
+        return 0.0
+    missed = 1 - float(memory.crept(step)[0]) / step / memory.compliance(step)
+    change = float(abs(point.pressure - before.pressure).sum()) * scene.grid.cell_area
+    return missed * (1 - memory.remaining(step)) * change
 
 
 # -------------------------------------------------------------------------------------------------------------- work
@@ -430,7 +450,7 @@ def transient_error(scene: Scene, start: Point, first: Point, end: Point, *, by_
 
 
 def part_relaxed(memory: Memory, step: float) -> float:
-    """Return the part of the change of a force under a steady approach that relaxes within a step. [s]"""
+    """Return the part of the change of a force under a steady approach that relaxes within a step [s]."""
     return 1 - step * memory.relaxation(step) / float(memory.relaxed(step)[0])
 
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from roughvisc.mechanics.memory import LARGEST_GROWTH
 from roughvisc.mechanics.program import Segment
 from roughvisc.mechanics.scene import Point, Scene
-from roughvisc.mechanics.stated_error import Difference, stated_parts
+from roughvisc.mechanics.stated_error import StepErrors, stated_over_difference
 
 #: Length of the first pair after an event, as a part of the segment: contact changes fast after a corner. Also the
 #: shortest pair that is repeated in halves because it misses the tolerance at a kept time, as a part of the time since
@@ -25,8 +25,9 @@ FIRST_PAIR = 0.005
 #: and both solutions would share an error of the slow exponentials: `closed_forms.py cells-one waves`, bad rows.
 RESOLVED = 1.5
 #: Part of the tolerance that a pair may add to the error: usually, and for bodies with hardly any instantaneous
-#: compliance. With 0.4, one in eight cases of such bodies has a row beyond the tolerance. With 0.2 a third to a half of
-#: these cases are within it, for 1.1 times the convolutions; with 0.1 three in five, for 1.26 times (`accuracy.py`).
+#: compliance. With ALLOWED_SOFT = 0.4 one in eight cases of such bodies has a row beyond the tolerance. With 0.2 a
+#: third to a half of these cases are within it, for 1.1 times the convolutions; with 0.1 three in five, for 1.26 times
+#: (`accuracy.py`).
 ALLOWED = 0.25
 ALLOWED_SOFT = 0.17
 #: Order of the error of a pair in its length, observed: cells enter and leave the contact within steps. With 2: 1.00,
@@ -69,7 +70,7 @@ class Pair:
         Both solutions before the pair.
     first, second : Point
         Fine solution after each step.
-    once : Point
+    coarse_end : Point
         Coarse solution at the end, in one step.
     is_soft : bool
         Whether hardly any of the compliance of the pair is instantaneous.
@@ -79,7 +80,7 @@ class Pair:
     coarse_start: Point
     first: Point
     second: Point
-    once: Point
+    coarse_end: Point
     is_soft: bool
 
     @property
@@ -92,17 +93,18 @@ class Pair:
         return bool((self.start.contact & ~self.second.contact).any())
 
 
-class Sizes(NamedTuple):
-    """Forces and approaches to which the errors of a pair are relative.
+class Scales(NamedTuple):
+    """Forces and approaches until a pair, from which the scale of its errors follows.
 
     Attributes
     ----------
     force, approach : float
-        Largest values of the kept rows so far; a given approach is the largest of all steps. [N, m]
+        Largest values of the kept rows so far; a prescribed approach, which states no error, of all steps. [N, m]
     largest : float
         Largest force of all steps. [N]
     peak : tuple of float
-        Force that is still the largest after relaxation, and the approach and the time then. [N, m, s]
+        Force, approach and time of the last step whose force exceeded what relaxation had left of the peak before it.
+        [N, m, s]
     """
 
     force: float
@@ -120,8 +122,8 @@ class Controller:
     shortest : float
         Pairs that are not longer are accepted. [s]
     growth : float
-        Largest growth of the next pair. After a pair that was refused at first it is small: of the pairs of a
-        relaxation every second one was refused.
+        Largest ratio of the lengths of the next pair and this one: `GROW`, or `LARGEST_GROWTH` if a trial of the pair
+        before was refused. With `GROW` always, every second pair of a relaxation is refused.
     refused : float
         Added error of the last refused trial of this pair, over the allowed error.
     refused_at_row : float
@@ -139,7 +141,7 @@ class Controller:
     def judge(
         self, taken: float, ratio: float, at_row: float, *, opens: bool, is_stiff: bool
     ) -> tuple[Controller | None, float]:
-        """Return the controller of the next trial, None if the pair is accepted, and the next length. [s]
+        """Return the controller and the length of the next trial, or None and the length of the next pair. [s]
 
         Parameters
         ----------
@@ -148,18 +150,18 @@ class Controller:
         ratio : float
             Error that the pair adds, over the allowed error.
         at_row : float
-            Error at the end of the pair, over the tolerance, if the end is kept; otherwise zero.
+            Error at the end of the pair, over the tolerance, if the pair may be repeated for its row; otherwise zero.
         opens : bool
             Whether contact seems to end although it should not: too long a step may undershoot.
         is_stiff : bool
-            Whether the memory uses BDF2 in the next pair.
+            Whether the memory may use BDF2 in the next pair.
         """
         factor = max(ratio, 1e-300) ** (-1 / ORDER)
         is_too_long = REJECTED < ratio < self.refused
-        misses = 1 < at_row < self.refused_at_row and ratio > 1  # shorter steps reduce no error from before the pair
+        misses = 1 < at_row < self.refused_at_row and ratio > 1  # else the error is from before the pair
         if taken > self.shortest:
             refused = replace(self, refused=ratio, tried=max(self.tried, taken))
-            if opens:
+            if opens:  # a smaller error is no condition here
                 return self, SHRINK * taken
             if is_too_long:
                 return refused, taken * max(factor, SHRINK)
@@ -167,7 +169,7 @@ class Controller:
                 return replace(refused, refused_at_row=at_row), 0.5 * taken
         largest = min(LARGEST_GROWTH / (1 + SLACK) if is_stiff else GROW, self.growth)
         if self.refused <= ratio:  # the error does not depend on the length, and the next pair need not be as short
-            return None, self.tried
+            return None, min(self.tried, largest * taken)
         if self.refused < math.inf:  # after a refused trial steps do not grow (Hairer, Norsett, Wanner I, section II.4)
             largest = 1.0
         return None, taken * min(max(factor, SHRINK), largest)
@@ -222,16 +224,17 @@ def errors_over_allowed(
     scene: Scene,
     pair: Pair,
     number: int,
-    error: Difference,
+    error: StepErrors,
     shared: float,
-    sizes: Sizes,
+    of_rows: Scales,
     *,
-    lands: bool,
+    has_row: bool,
 ) -> tuple[float, float]:
-    """Return the error that a pair adds at the next kept time, and its error at a kept row, over the allowed errors.
+    """Return the error that a pair adds at the next kept time, over the allowed error, and its error at a kept row.
 
-    Errors are relative to the largest force and approach of the kept rows, the next one included, as the stated errors
-    are. An approach counts as at least its rounding error: a flat periodic surface has no larger approach.
+    The second one is relative to the tolerance, and zero if the pair may not be repeated for it. Errors are relative to
+    the largest force and approach of the kept rows, of the pair, and of the next row as far as it is known. An approach
+    counts as at least its rounding error: a flat periodic surface has no larger approach.
 
     Parameters
     ----------
@@ -241,45 +244,48 @@ def errors_over_allowed(
         Both solutions.
     number : int
         Index of the segment.
-    error : Difference
+    error : StepErrors
         Stated error at the end of the pair.
     shared : float
         Error of the pressure that both solutions share. [N]
-    sizes : Sizes
+    of_rows : Scales
         Forces and approaches until the pair.
-    lands : bool
+    has_row : bool
         Whether the pair contains a kept row.
     """
     second = pair.second
     taken = pair.length
     memory = scene.memory
-    force = max(sizes.force, pair.first.size, second.size, scene.least_force)
+    force = max(of_rows.force, pair.first.size, second.size, scene.least_force)
     rounding = ROUNDING * memory.compliance(second.time) * scene.grid.largest_eigenvalue * force / scene.gap.size
     approach = max(
-        sizes.approach, abs(pair.first.approach), abs(second.approach), rounding / scene.grid.cell_area, 1e-300
+        of_rows.approach, abs(pair.first.approach), abs(second.approach), rounding / scene.grid.cell_area, 1e-300
     )
 
     row = 0.0
-    stated, of_approach = stated_parts(scene)
-    if lands and scene.keeps(second.time) and taken > FIRST_PAIR * (second.time - scene.program.corners[number]):
+    stated, of_approach = stated_over_difference(scene)
+    if has_row and scene.keeps(second.time) and taken > FIRST_PAIR * (second.time - scene.program.corners[number]):
         of_pressure = max(error.pressure / stated, error.pressure + shared) / force
         row = max(of_pressure, error.approach / of_approach / approach) / scene.tolerance
 
-    following = second.time if lands else min(scene.next_kept(second.time), scene.program.duration)
-    ahead = growth_until(scene, number, second, following)
-    expected = 0.0 if lands else expected_force(scene, pair, following, sizes)
+    following = second.time if has_row else min(scene.next_kept(second.time), scene.program.duration)
+    ahead = rise_until(scene, number, second, following)
+    expected = 0.0 if has_row else force_ahead(scene, pair, following, of_rows)
     scales = max(force, second.size * ahead, expected), max(approach, abs(second.approach) * ahead**0.5)
     allowed = ALLOWED_SOFT if scene.is_soft else ALLOWED
-    return added(scene, pair, number, following, scales) / (allowed * scene.tolerance), row
+    return added_error(scene, pair, number, following, scales) / (allowed * scene.tolerance), row
 
 
-def expected_force(scene: Scene, pair: Pair, following: float, sizes: Sizes) -> float:
-    """Return the force to expect at the next kept time; zero if nothing is known of it. [N]
+def force_ahead(scene: Scene, pair: Pair, following: float, of_rows: Scales) -> float:
+    """Return the force that divides the error at the next kept time; zero if nothing is known of it. [N]
 
-    The force is the prescribed load. Under an approach that grows until then it is at least proportional to the
-    approach, and grows from the present force to the peak. If the surfaces are apart at the kept time, any error of
-    the pressure is gone then: the largest force of all steps is returned if this is sure, and the peak if the present
-    rates of force and approach lead to it.
+    - Under a load: the prescribed load.
+    - Under an approach that grows until then: the force grows at least in proportion to the approach, and from the
+      present force to the peak.
+    - If the surfaces are surely apart then, any error of the pressure is gone: the largest force of all steps.
+    - If the present rates of force and approach lead to open surfaces: the peak, because the contact may last longer.
+
+    With adhesion no surfaces are apart, and nothing is known.
 
     Parameters
     ----------
@@ -289,33 +295,33 @@ def expected_force(scene: Scene, pair: Pair, following: float, sizes: Sizes) -> 
         Both solutions.
     following : float
         Next kept time. [s]
-    sizes : Sizes
+    of_rows : Scales
         Forces and approaches until the pair.
     """
     point = pair.second
     control, value = scene.program.known(following)
-    if math.isnan(value):
+    if math.isnan(value) or scene.adhesion is not None:
         return 0.0
     if control == "load":
-        return value or sizes.largest
-    touches = float(scene.gap[scene.solid].min())
-    if value <= touches:  # the undeformed surface is the highest
-        return sizes.largest
-    force, approach, then = sizes.peak
+        return value or of_rows.largest
+    first_touch = float(scene.gap[scene.solid].min())
+    if value <= first_touch:  # the undeformed surface is the highest
+        return of_rows.largest
+    force, approach, then = of_rows.peak
     peak = force * scene.memory.remaining(point.time - then)
     if value <= point.approach:
         fallen = pair.start.size - point.size
         receded = pair.start.approach - point.approach
-        parts = fallen > 0 and receded > 0 and point.size * receded <= fallen * (point.approach - value)
-        return peak if parts else 0.0
-    grown = point.size * (value - touches) / max(point.approach - touches, 1e-300)
+        will_part = fallen > 0 and receded > 0 and point.size * receded <= fallen * (point.approach - value)
+        return peak if will_part else 0.0
+    grown = point.size * (value - first_touch) / max(point.approach - first_touch, 1e-300)
     if approach <= point.approach:
         return grown
-    part = min((value - point.approach) / (approach - point.approach), 1.0)
-    return max(grown, point.size + part * max(peak - point.size, 0.0))
+    fraction = min((value - point.approach) / (approach - point.approach), 1.0)
+    return max(grown, point.size + fraction * max(peak - point.size, 0.0))
 
 
-def growth_until(scene: Scene, number: int, point: Point, following: float) -> float:
+def rise_until(scene: Scene, number: int, point: Point, following: float) -> float:
     """Return the growth of the prescribed value until the next kept time, at least one."""
     until = min(following, scene.program.corners[number + 1])
     now = scene.program.prescribed(number, point.time, point.start)
@@ -323,7 +329,7 @@ def growth_until(scene: Scene, number: int, point: Point, following: float) -> f
     return max(then / now, 1.0) if now > 0 else 1.0
 
 
-def added(scene: Scene, pair: Pair, number: int, following: float, scales: tuple[float, float]) -> float:
+def added_error(scene: Scene, pair: Pair, number: int, following: float, scales: tuple[float, float]) -> float:
     """Return the error that a pair adds at the next kept time: of pressure, approach, and displaced surface.
 
     The error is the change of the difference between both solutions over the pair, from its value before the pair or
@@ -340,12 +346,12 @@ def added(scene: Scene, pair: Pair, number: int, following: float, scales: tuple
     """
     memory = scene.memory
     second = pair.second
-    once = pair.once
+    coarse_end = pair.coarse_end
     taken = pair.length
     is_soft = pair.is_soft
     by_load = scene.program.segments[number].control == "load"
     receding = pair.receding()
-    at_end = second.pressure - once.pressure
+    at_end = second.pressure - coarse_end.pressure
     at_start = pair.start.pressure - pair.coarse_start.pressure
     change = float(abs(at_end - at_start).sum())
     if is_soft:
@@ -361,10 +367,10 @@ def added(scene: Scene, pair: Pair, number: int, following: float, scales: tuple
         remains = max(memory.remaining(ahead) / left if left > 0 else 0.0, LEAST_REMAINING)
     error = change * scene.grid.cell_area / scales[0] * remains
     if by_load:
-        of_approach = (second.approach - once.approach) - (pair.start.approach - pair.coarse_start.approach)
+        of_approach = (second.approach - coarse_end.approach) - (pair.start.approach - pair.coarse_start.approach)
         error = max(error, abs(of_approach) / scales[1])
     if not by_load or second.is_open or is_soft:
-        surface = memory.displacement(second.history)[0] - memory.displacement(once.history)[0]
+        surface = memory.displacement(second.history)[0] - memory.displacement(coarse_end.history)[0]
         surface -= memory.displacement(pair.start.history)[0] - memory.displacement(pair.coarse_start.history)[0]
         error = max(error, float(abs(surface).max()) / scales[1] * (1.0 if is_soft or receding else remains))
     return error

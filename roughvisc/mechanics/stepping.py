@@ -32,18 +32,19 @@ from roughvisc.mechanics.scene import SOFT, Array, Packed, Point, Scene
 from roughvisc.mechanics.stated_error import (
     LASTING,
     UNBOUNDED,
-    Difference,
+    StepErrors,
     difference,
-    entered_early,
-    entering,
+    error_of_late_entry,
     force_of_entered,
     friction,
     left_of_friction,
     phase_error,
+    shared_error_of_entered,
     skipped_friction,
+    skipped_pressure,
     touch,
     transient_error,
-    unsettled,
+    uncertain_force_of_entered,
     work_of_pair,
     work_of_step,
 )
@@ -54,7 +55,7 @@ from roughvisc.mechanics.step_control import (
     SHORTEST_PAIR,
     Controller,
     Pair,
-    Sizes,
+    Scales,
     errors_over_allowed,
     first_length,
     pair_ends,
@@ -85,18 +86,18 @@ class State:
     ----------
     fine : Point
         Solution with the shorter steps.
-    twice : Point or None
+    coarse : Point or None
         Solution with steps twice as long, at the same instant; None while both solutions are equal.
     segment : int
         Index of the segment of the program.
     next_length : float
         Length of the next pair; zero after an event. [s]
-    difference : Difference
+    difference : StepErrors
         Stated error of the time steps.
     largest_force, largest_approach : float
         Largest values so far. [N, m]
     kept_force, kept_approach : float
-        Largest values of the yielded steps at kept times so far. [N, m]
+        Largest values of the yielded steps at kept times so far, this one included. [N, m]
     solver_error : float
         Largest relative error of the pressure due to the contact solver so far.
     work : float
@@ -110,11 +111,12 @@ class State:
     dissipated : float
         Energy that jumps of an elastic body with adhesion have dissipated so far. [J]
     peak : tuple of float
-        Force that is still the largest after relaxation, and the approach and the time then. [N, m, s]
+        Force, approach and time of the last step whose force exceeded what relaxation had left of the peak before it.
+        [N, m, s]
     growth : float
-        Largest ratio of the lengths of the next pair and of the last one.
+        Largest ratio of the lengths of the pair after the next one and of the next one.
     entered : tuple of float
-        Force on the cells of a soft body that entered the contact last, and the approach at which they did. [N, m]
+        Force on the cells of a soft body that entered last, within the error of the gap, and the approach then. [N, m]
     distance : float
         Length of the path of the slides so far. [m]
     convolutions : int
@@ -122,10 +124,10 @@ class State:
     """
 
     fine: Point
-    twice: Point | None = None
+    coarse: Point | None = None
     segment: int = 0
     next_length: float = 0.0
-    difference: Difference = Difference()
+    difference: StepErrors = StepErrors()
     largest_force: float = 0.0
     largest_approach: float = 0.0
     kept_force: float = 0.0
@@ -150,7 +152,7 @@ class Step(NamedTuple):
     ----------
     point : Point
         Fine solution, with the pressure at the end of the step.
-    difference : Difference
+    difference : StepErrors
         Error of the time steps.
     segment : int
         Index of the segment that the step belongs to.
@@ -162,7 +164,7 @@ class Step(NamedTuple):
     """
 
     point: Point
-    difference: Difference
+    difference: StepErrors
     segment: int
     state: State
     is_end: bool = True
@@ -278,13 +280,13 @@ def next_segment(scene: Scene, state: State) -> State:
             )
     jumped = load != fine.force
     points = []
-    for point in (fine, state.twice or fine):
+    for point in (fine, state.coarse or fine):
         start = point.approach if following.control == "approach" else load if jumped else point.force
         is_late = jumped or (corner.is_abrupt and not point.is_open)
         points.append(replace(without_past(point), start=start, is_late=is_late))
     keeps_length = corner.is_smooth and not fine.is_open and scene.adhesion is None
     length = state.next_length if keeps_length else 0.0
-    return replace(state, fine=points[0], twice=points[1] if state.twice else None, segment=index, next_length=length)
+    return replace(state, fine=points[0], coarse=points[1] if state.coarse else None, segment=index, next_length=length)
 
 
 def without_past(point: Point) -> Point:
@@ -295,7 +297,7 @@ def without_past(point: Point) -> Point:
 def single_step(scene: Scene, state: State, time: float, *, may_refuse: bool = False) -> Step:
     """Return one step that both solutions take: a jump, or a step without contact or without memory."""
     fine = state.fine
-    coarse = state.twice or state.fine
+    coarse = state.coarse or state.fine
     number = state.segment
     new = other = take_step(scene, fine, time, number, rule="linear", may_refuse=may_refuse)
     if coarse is not fine:
@@ -306,12 +308,12 @@ def single_step(scene: Scene, state: State, time: float, *, may_refuse: bool = F
     lasting = error.at_least(state.difference, left)
     error = replace(error, shared=lasting.shared) if new.is_open else lasting
     reached = new
-    twice = other
+    coarse_end = other
     if new.is_open and fine.is_open and not fine.is_late:
         reached = without_past(new)
-        twice = reached if other is new else without_past(other)
+        coarse_end = reached if other is new else without_past(other)
     work = state.work + work_of_step(scene, fine, new)
-    after = after_steps(scene, state, [reached], twice, difference=error, work=work)
+    after = after_steps(scene, state, [reached], coarse_end, difference=error, work=work)
     return Step(new, error, number, after)
 
 
@@ -402,7 +404,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         length = min(length, segment.period / PAIRS_OF_A_CYCLE)
     controller = Controller(shortest_length(scene, number), state.growth)
     by_load = segment.control == "load"
-    sizes = Sizes(
+    scales = Scales(
         state.kept_force,
         state.kept_approach if by_load else state.largest_approach,
         state.largest_force,
@@ -410,44 +412,54 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
     )
     while True:
         middle, last = pair_ends(scene, number, fine.time, length, is_first=not state.next_length)
+        # without kept times the end of each pair is a row
         times = (last,) if scene.kept is None else scene.kept_within(fine.time, last)
         pair, at_end, coarse_at_end = solve_pair(scene, state, middle, last, has_row=bool(times))
         slide = scene.motions[number] if times else None
         error = difference(scene, fine, at_end, coarse_at_end, slide, is_kept=bool(times))
         if times and not pair.is_soft:  # a pair without a kept row adds nothing to this error
-            error = replace(error, shared=entered_early(scene, fine, pair.second))
+            error = replace(error, shared=shared_error_of_entered(scene, fine, pair.second))
         if scene.time_step is not None:
+            next_length = length
             break
         shared = error.shared + state.difference.shared * scene.memory.remaining(pair.length)
-        ratio, at_row = errors_over_allowed(scene, pair, number, error, shared, sizes, lands=bool(times))
+        ratio, at_row = errors_over_allowed(scene, pair, number, error, shared, scales, has_row=bool(times))
         loses_contact = not fine.is_open and (pair.first.is_open or pair.second.is_open)
         opens = not by_load and loses_contact and pair.second.approach >= fine.approach
         is_stiff = scene.memory.grows(GROW * pair.length, STIFF)
-        again, length = controller.judge(pair.length, ratio, at_row, opens=opens, is_stiff=is_stiff)
+        again, proposed = controller.judge(pair.length, ratio, at_row, opens=opens, is_stiff=is_stiff)
         if again is None:
+            next_length = proposed
             break
         controller = again
+        length = proposed
         del pair, at_end, coarse_at_end  # frees their memory while the pair is repeated
 
     growth = LARGEST_GROWTH if controller.refused < math.inf else GROW
-    return accepted(scene, replace(state, growth=growth), pair, at_end, times, error, length)
+    return accepted(scene, replace(state, growth=growth), pair, at_end, times, error, next_length)
 
 
 def solve_pair(scene: Scene, state: State, middle: float, last: float, *, has_row: bool) -> tuple[Pair, Point, Point]:
     """Return a pair of steps, and both solutions at its end with the pressures at that time if it has a kept row."""
     fine = state.fine
-    coarse = state.twice or state.fine
+    coarse = state.coarse or state.fine
     number = state.segment
     is_soft = scene.memory.grows(last - fine.time, SOFT)
     needs_pressure = has_row and is_soft
     solver_part = END_STEP if needs_pressure else SOLVER_PART
     first = take_step(scene, fine, middle, number, solver_part=solver_part)
     second = take_step(scene, first, last, number, solver_part=solver_part)
-    once = take_step(scene, coarse, last, number, guess=with_difference(second, coarse, fine), solver_part=solver_part)
-    pair = Pair(fine, coarse, first, second, once, is_soft)
+    coarse_end = take_step(
+        scene, coarse, last, number, guess=with_difference(second, coarse, fine), solver_part=solver_part
+    )
+    pair = Pair(fine, coarse, first, second, coarse_end, is_soft)
     if not needs_pressure:
-        return pair, second, once
-    return pair, with_final_pressure(scene, first, second, number), with_final_pressure(scene, coarse, once, number)
+        return pair, second, coarse_end
+    return (
+        pair,
+        with_final_pressure(scene, first, second, number),
+        with_final_pressure(scene, coarse, coarse_end, number),
+    )
 
 
 def accepted(
@@ -456,7 +468,7 @@ def accepted(
     pair: Pair,
     at_end: Point,
     times: tuple[float, ...],
-    error: Difference,
+    error: StepErrors,
     next_length: float,
 ) -> list[Step]:
     """Return the steps of an accepted pair, with the kept rows inside it and the state after it.
@@ -471,7 +483,7 @@ def accepted(
         Fine solution at the end, with the pressure at that time.
     times : tuple of float
         Kept times of the pair. [s]
-    error : Difference
+    error : StepErrors
         Error that the pair states at its end.
     next_length : float
         Length of the next pair. [s]
@@ -482,7 +494,7 @@ def accepted(
     former = state.difference
     slide = scene.motions[number]
 
-    def at_least(error: Difference, point: Point) -> Difference:
+    def with_former(error: StepErrors, point: Point) -> StepErrors:
         left = memory.remaining(point.time - fine.time)
         of_friction = 0.0
         if slide is not None and former.friction > 0:
@@ -490,13 +502,13 @@ def accepted(
             error = replace(error, friction=max(error.friction, unresolved))
         return error.at_least(former, left, of_friction, is_soft=pair.is_soft)
 
-    def at_row(error: Difference, point: Point) -> Difference:
+    def with_late_entry(error: StepErrors, point: Point) -> StepErrors:
         if not pair.is_soft:
             return error
-        uncertain = unsettled(scene, fine, point, error.gap, state.entered)
+        uncertain = error_of_late_entry(scene, fine, point, error.gap, state.entered)
         return replace(error, shared=max(error.shared, uncertain))
 
-    error = at_least(error, pair.second)
+    error = with_former(error, pair.second)
     entered = state.entered
     force = force_of_entered(scene, fine, pair.second) if pair.is_soft else 0.0
     if force > 0:
@@ -508,17 +520,17 @@ def accepted(
         if time not in (pair.first.time, pair.second.time):
             inside.append(row_inside(scene, pair, time, number))
     inside.sort(key=lambda point: point.time)
-    is_first = fine.time == scene.program.corners[number]
+    follows_corner = fine.time == scene.program.corners[number]
     works, work_error, last_error = work_of_pair(scene, fine, pair.first, pair.second, inside)
     by_load = scene.program.segments[number].control == "load"
     relaxing = 0.0
-    if is_first and not fine.is_late:
+    if follows_corner and not fine.is_late:
         relaxing = transient_error(scene, fine, pair.first, pair.second, by_load=by_load)
     after = after_steps(
         scene,
         state,
         [pair.first, pair.second],
-        pair.once,
+        pair.coarse_end,
         next_length,
         difference=error,
         work=state.work + works[-1],
@@ -531,16 +543,16 @@ def accepted(
     of_work = max(state.work_difference, after.work_difference, key=abs)
     for point, work in zip(inside, works[:-1], strict=True):
         left = 1.0 if pair.is_soft else memory.remaining(point.time - fine.time)
-        uncertain = entering(scene, fine, point)
-        uncertain = uncertain if pair.is_soft else max(uncertain, entered_early(scene, fine, point))
-        between = at_least(replace(error.or_larger(former, left), shared=uncertain), point)
-        between = at_row(between, point)
+        uncertain = uncertain_force_of_entered(scene, fine, point)
+        uncertain = uncertain if pair.is_soft else max(uncertain, shared_error_of_entered(scene, fine, point))
+        between = with_former(replace(error.or_larger(former, left), shared=uncertain), point)
+        between = with_late_entry(between, point)
         curved = math.hypot(state.work_curved, work_error if point.time <= pair.first.time else last_error)
         within = replace(
             state, work=state.work + work, work_curved=curved, work_difference=of_work, work_relaxed=after.work_relaxed
         )
         steps.append(Step(point, between, number, within, is_end=False))
-    return [*steps, Step(at_end, at_row(error, at_end), number, after)]
+    return [*steps, Step(at_end, with_late_entry(error, at_end), number, after)]
 
 
 def row_at_middle(scene: Scene, pair: Pair, number: int) -> Point:
@@ -600,7 +612,7 @@ def after_steps(
     fine = points[-1]
     of_work = 0.0
     if coarse is not fine:
-        of_work = work_of_step(scene, state.twice or state.fine, coarse) - work_of_step(scene, state.fine, fine)
+        of_work = work_of_step(scene, state.coarse or state.fine, coarse) - work_of_step(scene, state.fine, fine)
     peak = state.peak
     for point in (points[0], fine):
         if point.size > peak[0] * scene.memory.remaining(point.time - peak[2]):
@@ -608,7 +620,7 @@ def after_steps(
     reached = replace(
         state,
         fine=fine,
-        twice=None if coarse is fine else replace(coarse, previous=None),  # the coarse solution does not extrapolate
+        coarse=None if coarse is fine else replace(coarse, previous=None),  # the coarse solution does not extrapolate
         next_length=next_length,
         largest_force=max(state.largest_force, points[0].size, fine.size),
         largest_approach=max(state.largest_approach, abs(points[0].approach), abs(fine.approach)),
@@ -633,7 +645,7 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     grid = scene.grid
     memory = scene.memory
     fine = state.fine
-    coarse = state.twice or state.fine
+    coarse = state.coarse or state.fine
     began, end = scene.program.corners[state.segment : state.segment + 2]
     cells = slide.cells(grid.spacing)
     side = grid.spacing[slide.axis]
@@ -657,15 +669,15 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
         time = instant(began, end, taken + number, cells)
         points.append(over(here, 1, time, (here.pressure, here.history.fields[0])))
         works.append(works[-1] + work_of_step(scene, here, points[-1], slides=True))
-    once = last = points[-1]
+    coarse_end = last = points[-1]
     if coarse is not fine or count == 2:
-        once = over(coarse, count, last.time, with_difference(last, coarse, fine))
+        coarse_end = over(coarse, count, last.time, with_difference(last, coarse, fine))
 
     is_kept = any(scene.keeps(point.time) for point in points[1:])
-    error = difference(scene, fine, last, once, slide, is_kept=is_kept)
+    error = difference(scene, fine, last, coarse_end, slide, is_kept=is_kept)
     relaxed = memory.remaining(last.time - fine.time)
     shared = 0.0
-    if count == 1 and not memory.is_elastic:  # the coarse solution takes the same step: both solver_part its error
+    if count == 1 and not memory.is_elastic:  # the coarse solution takes the same step: both share its error
         former = state.difference.pressure
         if cells == 1:
             former = UNBOUNDED * float(abs(last.pressure - moved(fine.pressure, 1)).sum()) * grid.cell_area
@@ -685,12 +697,15 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     error = replace(error, friction=of_friction)
     work = state.work + works[-1]
     distance = state.distance + count * side
-    after = after_steps(scene, state, points[1:], once, difference=error, work=work, distance=distance)
+    after = after_steps(scene, state, points[1:], coarse_end, difference=error, work=work, distance=distance)
     of_work = max(state.work_difference, after.work_difference, key=abs)
     inside = replace(state, work=state.work + works[1], work_difference=of_work, distance=state.distance + side)
     ends = Step(last, error, state.segment, after)
     between = error.or_larger(state.difference)
     between = replace(between, friction=max(between.friction, skipped))
+    if taken == 0 and not memory.is_elastic:
+        missed = skipped_pressure(scene, body_under(fine, 1), points[1], step)
+        between = replace(between, pressure=max(between.pressure, missed))
     return [Step(points[1], between, state.segment, inside, is_end=False), ends][-count:]
 
 
@@ -800,12 +815,21 @@ def take_step(
     unit /= alpha
     force, approach = (value, contact.approach) if by_load else (contact.load / alpha * area, value)
     history = memory.advance(here.history, prediction, unit, pressure)
-    errors = (contact.error, contact.approach_error)
     stored = pressure
     if pressure.size >= PACKED_FROM and 2 * int((pressure > 0).sum()) < pressure.size:
         cells = grid.xp.flatnonzero(pressure).astype(np.int32)
         stored = Packed(pressure.shape, cells, pressure.reshape(-1)[cells])
-    return Point(time, stored, force, approach, history, previous, here.start, False, *errors)
+    return Point(
+        time,
+        stored,
+        force,
+        approach,
+        history,
+        previous,
+        here.start,
+        solver_error=contact.error,
+        solver_error_approach=contact.approach_error,
+    )
 
 
 def with_difference(second: Point, coarse: Point, fine: Point) -> Guess:
