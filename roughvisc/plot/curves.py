@@ -26,6 +26,9 @@ from roughvisc.variables import AXES, VARIABLES, axis_of
 _VISIBLE = 0.01
 #: Largest number of rows for which dots are drawn.
 _DOTS = 40
+#: Places of the label of a point, around it [pt], and half of the room that a label takes, both axes.
+_OFFSETS = ((0.0, 7.0), (0.0, -7.0), (14.0, 0.0), (-14.0, 0.0))
+_LABEL = (16.0, 7.0)
 
 
 @style.apply
@@ -320,12 +323,27 @@ def trade(dataset: xr.Dataset, quantity: str | None = None) -> Figure:
     low, high = ax.get_ylim()
     if unsure > low:
         ax.axhspan(low, unsure, color="0.93", zorder=0, label="reference uncertainty")
-    for place in zip(table["run_time"], table["error"], table["tolerance"], strict=True):
-        look = {"textcoords": "offset points", "fontsize": 6.5, "color": "0.25", "ha": "center"}
-        ax.annotate(format_tolerance(place[2]), place[:2], (0, 4), **look)
     ax.set(ylim=(low, high), xlabel="Wall time [s]", ylabel=f"Error of {VARIABLES[quantity].label.lower()} [%]")
+    points = table[["run_time", "error"]].to_numpy()
+    for point, offset, tolerance in zip(points, _free_offsets(ax, points), table["tolerance"], strict=True):
+        look = {"textcoords": "offset points", "fontsize": 6.5, "color": "0.25", "ha": "center", "va": "center"}
+        ax.annotate(format_tolerance(tolerance), point, offset, **look)
     style.legend_above(figure, style.named_in(ax))
     return figure
+
+
+def _free_offsets(ax: Any, points: np.ndarray) -> list[tuple[float, float]]:
+    """Return the offset of the label of each point [pt], to the first of four places far from points and labels."""
+    scale = 72 / ax.figure.dpi
+    here = scale * ax.transData.transform(points)
+    taken = [*here]
+    offsets = []
+    for point in here:
+        away = [min(np.hypot(*((point + offset - other) / np.array(_LABEL))) for other in taken) for offset in _OFFSETS]
+        best = next((number for number, distance in enumerate(away) if distance >= 1), int(np.argmax(away)))
+        offsets.append(_OFFSETS[best])
+        taken.append(point + _OFFSETS[best])
+    return offsets
 
 
 @style.apply
