@@ -282,9 +282,8 @@ class LoadingRows(Rows):
             # If hardly any compliance is instantaneous, the pressure of a step that is not kept belongs to the step and
             # not to its end. A prescribed load is correct even then.
             by_load = scene.program.segments[step.segment].control == "load"
-            length = max(
-                point.time - (point.previous[0] if point.previous else scene.program.corners[step.segment]), 0.0
-            )
+            began = point.previous[0] if point.previous else scene.program.corners[step.segment]
+            length = max(point.time - began, 0.0)  # of the step, which began at its previous point
             if kept or (not every and (by_load or not scene.memory.grows(length, SOFT))):
                 values, fields = self._row(step, length, stated, kept, jumps)
             yield Row(point.time, values, fields, kept, self.state if step.is_end else None, point.time)

@@ -79,7 +79,7 @@ class Scene:
         Whether the body has an instantaneous compliance.
     is_soft : bool
         Whether hardly any of the compliance at the end of the program is instantaneous.
-    corners : list of Corner
+    transitions : list of Corner
         Corner at the end of each segment.
     motions : list of Slide or None
         Slide of each segment for the friction: its own, the last one, or the first; None without slides.
@@ -97,14 +97,14 @@ class Scene:
     solid: Any = field(init=False)
     can_jump: bool = field(init=False)
     is_soft: bool = field(init=False)
-    corners: list[Corner] = field(init=False)
+    transitions: list[Corner] = field(init=False)
     motions: list[Slide | None] = field(init=False)
 
     def __post_init__(self) -> None:
         self.solid = ... if self.present is None else self.present
         self.can_jump = self.memory.compliance(0.0) > 0
         self.is_soft = self.memory.grows(self.program.duration, SOFT)
-        self.corners = corners_of(self.program, self.can_jump)
+        self.transitions = corners_of(self.program, self.can_jump)
         motion = None
         self.motions = []
         for segment in reversed(self.program.segments):

@@ -149,12 +149,12 @@ def difference(
     if fine is coarse:
         return StepErrors()
     grid = scene.grid
-    stated, of_approach = stated_over_difference(scene)
+    factor, of_approach = stated_over_difference(scene)
     pressure = fine.pressure
     other = coarse.pressure
     error = StepErrors(
-        pressure=stated * (float(abs(pressure - other).sum()) * grid.cell_area),
-        force=stated * abs(fine.force - coarse.force),
+        pressure=factor * (float(abs(pressure - other).sum()) * grid.cell_area),
+        force=factor * abs(fine.force - coarse.force),
         approach=of_approach * abs(fine.approach - coarse.approach),
     )
     if slide is not None:

@@ -263,10 +263,12 @@ def errors_over_allowed(
     )
 
     row = 0.0
-    stated, of_approach = stated_over_difference(scene)
+    factor, factor_of_approach = stated_over_difference(scene)
+    # a pair that is short for its place in the segment is not repeated, see FIRST_PAIR
     if has_row and scene.keeps(second.time) and taken > FIRST_PAIR * (second.time - scene.program.corners[number]):
-        of_pressure = max(error.pressure / stated, error.pressure + shared) / force
-        row = max(of_pressure, error.approach / of_approach / approach) / scene.tolerance
+        # the whole difference, or the stated error with the shared one, whichever is larger
+        of_pressure = max(error.pressure / factor, error.pressure + shared) / force
+        row = max(of_pressure, error.approach / factor_of_approach / approach) / scene.tolerance
 
     following = second.time if has_row else min(scene.next_kept(second.time), scene.program.duration)
     ahead = rise_until(scene, number, second, following)
@@ -361,7 +363,7 @@ def added_error(scene: Scene, pair: Pair, number: int, following: float, scales:
         change = min(change, float(abs(at_end - memory.remaining(taken) * at_start).sum()))
         ahead = following - second.time
         left = 1.0
-        if not by_load:  # the change excludes what relaxes from the middle of the pair on
+        if not by_load:  # the error arises about the middle of the pair, and has relaxed since: count from there
             ahead = following - pair.first.time
             left = memory.remaining(taken / 2)
         remains = max(memory.remaining(ahead) / left if left > 0 else 0.0, LEAST_REMAINING)

@@ -97,9 +97,9 @@ class State:
     largest_force, largest_approach : float
         Largest values so far. [N, m]
     kept_force, kept_approach : float
-        Largest values of the yielded steps at kept times so far, this one included. [N, m]
+        Largest values of the yielded steps at kept times so far, this one included (:func:`with_largest_kept`). [N, m]
     solver_error : float
-        Largest relative error of the pressure due to the contact solver so far.
+        Largest relative error of the pressure due to the contact solver so far; within a pair, before the pair.
     work : float
         Work of the normal force since the start. [J]
     work_difference : float
@@ -267,7 +267,7 @@ def next_segment(scene: Scene, state: State) -> State:
     index = state.segment + 1
     last = segments[index - 1]
     following = segments[min(index, len(segments) - 1)]
-    corner = scene.corners[index - 1]
+    corner = scene.transitions[index - 1]
     load = fine.force
     if last.duration == 0 and not scene.can_jump:
         value = scene.program.prescribed(state.segment, fine.time, fine.start)
@@ -543,6 +543,7 @@ def accepted(
     of_work = max(state.work_difference, after.work_difference, key=abs)
     for point, work in zip(inside, works[:-1], strict=True):
         left = 1.0 if pair.is_soft else memory.remaining(point.time - fine.time)
+        # at the end of a soft pair the difference contains this force; otherwise its error is what both share
         uncertain = uncertain_force_of_entered(scene, fine, point)
         uncertain = uncertain if pair.is_soft else max(uncertain, shared_error_of_entered(scene, fine, point))
         between = with_former(replace(error.or_larger(former, left), shared=uncertain), point)
@@ -766,13 +767,13 @@ def take_step(
     grid = prediction.grid or scene.grid
     gap += scene.gap
     lowest = float(gap[scene.solid].min())
-    common = here.history.fields[0] if prediction.grid is None else None  # displacement per unit compliance
-    previous = (here.time, here.stored_pressure, common) if step > 0 and not here.is_late else None
+    unit_before = here.history.fields[0] if prediction.grid is None else None  # displacement per unit compliance
+    previous = (here.time, here.stored_pressure, unit_before) if step > 0 and not here.is_late else None
     if scene.adhesion is None and ((value == 0) if by_load else (value <= lowest)):
         nothing = grid.xp.zeros(gap.shape)
         history = memory.advance(here.history, prediction, nothing, nothing)
         return Point(time, nothing, 0.0, lowest if by_load else value, history, previous, here.start)
-    pressure, unit = guess or (here.pressure, common)
+    pressure, unit = guess or (here.pressure, unit_before)
     if guess is None and here.previous is not None and step > 0:
         # Extrapolate from the last two points.
         then, stored, former_unit = here.previous
@@ -794,6 +795,7 @@ def take_step(
             by_load=by_load,
             may_refuse=may_refuse,
         )
+    # the solver takes pressures over the contact modulus, which is 1 / alpha here
     start = dict[str, Any]()
     if guess or not here.is_open:  # otherwise the first guess would be zero
         pressure = alpha * pressure
