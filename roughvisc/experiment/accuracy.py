@@ -149,7 +149,7 @@ def error_columns(step: Step, scene: Scene) -> dict[str, float]:
     """
     point = step.point
     state = step.state
-    error = step.difference
+    error = step.errors
     control = scene.program.segments[step.segment].control
     given = scene.program.prescribes[step.segment]
     remembers = not scene.memory.is_elastic

@@ -355,7 +355,7 @@ class LoadingRows(Rows):
         slide = scene.motions[step.segment]
         friction = None
         if slide is not None:
-            friction = Stated(tangential_force(grid, pressure, displaced[0], slide), step.difference.friction)
+            friction = Stated(tangential_force(grid, pressure, displaced[0], slide), step.errors.friction)
         off_area = self._area_error(step, length, gap, counted, area) if kept else math.nan
         force = Stated(point.force, stated["force_error"])
         row: dict[str, Any] = stated | columns_of(force, Stated(area, off_area), profile.area, friction)
@@ -413,7 +413,7 @@ class LoadingRows(Rows):
         """
         scene = self.scene
         point = step.point
-        difference = step.difference
+        difference = step.errors
         inside = 0.0
         outside = 0.0
         if counted > 0 and point.solver_error > 0:

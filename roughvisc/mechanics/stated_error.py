@@ -98,7 +98,7 @@ class StepErrors:
         left_of_friction : float
             Part of the friction force that is left, see :func:`left_of_friction`.
         is_soft : bool
-            Whether hardly any of the compliance is instantaneous: only the shared error fades then.
+            Whether hardly any of the compliance is instantaneous: the errors of pressure and force do not fade then.
         """
         lasting = LASTING if is_soft else LASTING * left
         return replace(

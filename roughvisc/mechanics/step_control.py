@@ -127,7 +127,7 @@ class Controller:
     refused : float
         Added error of the last refused trial of this pair, over the allowed error.
     refused_at_row : float
-        Error of this trial at its kept row, over the tolerance.
+        Error at the row of the last trial that was refused for its row, over the tolerance; infinite if there is none.
     tried : float
         Length of the longest refused trial. [s]
     """
@@ -191,9 +191,9 @@ def shortest_length(scene: Scene, number: int) -> float:
 def pair_ends(scene: Scene, number: int, now: float, length: float, *, is_first: bool) -> tuple[float, float]:
     """Return the middle and the end of the next pair of about a given length in a segment. [s]
 
-    The last kept time near the end of the pair becomes its end. The first pair after an event ends at a kept time at
-    the latest, because a fast relaxation in it may be over at its end. If `scene.time_step` is fixed, steps are at most
-    that long, and kept times are the middle or the end of pairs.
+    The last kept time near the end of the pair becomes its end. The first pair of a new length (`is_first`) ends at a
+    kept time at the latest, because a fast relaxation in it may be over at its end. If `scene.time_step` is fixed,
+    steps are at most that long, and kept times are the middle or the end of pairs.
     """
     segment = scene.program.segments[number]
     began, end = scene.program.corners[number : number + 2]
@@ -271,9 +271,10 @@ def errors_over_allowed(
         row = max(of_pressure, error.approach / factor_of_approach / approach) / scene.tolerance
 
     following = second.time if has_row else min(scene.next_kept(second.time), scene.program.duration)
-    ahead = rise_until(scene, number, second, following)
+    rise = rise_until(scene, number, second, following)
     expected = 0.0 if has_row else force_ahead(scene, pair, following, of_rows)
-    scales = max(force, second.size * ahead, expected), max(approach, abs(second.approach) * ahead**0.5)
+    # under a load the approach grows at least as the root of the load, as that of a cone
+    scales = max(force, second.size * rise, expected), max(approach, abs(second.approach) * rise**0.5)
     allowed = ALLOWED_SOFT if scene.is_soft else ALLOWED
     return added_error(scene, pair, number, following, scales) / (allowed * scene.tolerance), row
 

@@ -91,8 +91,8 @@ class State:
     segment : int
         Index of the segment of the program.
     next_length : float
-        Length of the next pair; zero after an event. [s]
-    difference : StepErrors
+        Length of the next pair; zero: :func:`first_length` chooses it. [s]
+    errors : StepErrors
         Stated error of the time steps.
     largest_force, largest_approach : float
         Largest values so far. [N, m]
@@ -127,7 +127,7 @@ class State:
     coarse: Point | None = None
     segment: int = 0
     next_length: float = 0.0
-    difference: StepErrors = StepErrors()
+    errors: StepErrors = StepErrors()
     largest_force: float = 0.0
     largest_approach: float = 0.0
     kept_force: float = 0.0
@@ -152,7 +152,7 @@ class Step(NamedTuple):
     ----------
     point : Point
         Fine solution, with the pressure at the end of the step.
-    difference : StepErrors
+    errors : StepErrors
         Error of the time steps.
     segment : int
         Index of the segment that the step belongs to.
@@ -164,7 +164,7 @@ class Step(NamedTuple):
     """
 
     point: Point
-    difference: StepErrors
+    errors: StepErrors
     segment: int
     state: State
     is_end: bool = True
@@ -204,7 +204,7 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
         if segments and segments[0].duration > 0:
             if scene.keeps(0.0):
                 state = replace(state, kept_force=state.fine.size, kept_approach=abs(state.fine.approach))
-            yield Step(state.fine, state.difference, 0, state)
+            yield Step(state.fine, state.errors, 0, state)
     scene.grid.convolutions = state.convolutions
     while state.segment < len(segments):
         number = state.segment
@@ -218,12 +218,13 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
             steps = [single_step(scene, state, state.fine.time)]
         else:  # the next step takes the jump
             later = next_segment(scene, state)
-            steps = [Step(later.fine, later.difference, number, later)]
+            steps = [Step(later.fine, later.errors, number, later)]
         state = steps[-1].state
         jumps_next = number < state.segment < len(segments) and segments[state.segment].duration == 0
         comes_again = jumps_next and (scene.can_jump or is_jump)
         if comes_again or (is_jump and not (scene.can_jump or is_start)):
             steps.pop()
+        # no step changes kept_force and kept_approach: the state has the values before the steps
         steps = with_largest_kept(scene, state, steps)
         if steps:
             last = steps[-1].state
@@ -305,7 +306,7 @@ def single_step(scene: Scene, state: State, time: float, *, may_refuse: bool = F
         other = take_step(scene, coarse, time, number, guess=with_difference(new, coarse, fine), rule=rule)
     error = difference(scene, fine, new, other, scene.motions[number], is_kept=scene.keeps(time))
     left = scene.memory.remaining(time - fine.time)
-    lasting = error.at_least(state.difference, left)
+    lasting = error.at_least(state.errors, left)
     error = replace(error, shared=lasting.shared) if new.is_open else lasting
     reached = new
     coarse_end = other
@@ -313,7 +314,7 @@ def single_step(scene: Scene, state: State, time: float, *, may_refuse: bool = F
         reached = without_past(new)
         coarse_end = reached if other is new else without_past(other)
     work = state.work + work_of_step(scene, fine, new)
-    after = after_steps(scene, state, [reached], coarse_end, difference=error, work=work)
+    after = after_steps(scene, state, [reached], coarse_end, errors=error, work=work)
     return Step(new, error, number, after)
 
 
@@ -377,28 +378,28 @@ def step_while_open(scene: Scene, state: State, closes: float) -> Step:
     before, left = (touch(scene, point) - point.approach for point in (state.fine, step.point))
     if scene.can_jump or left >= min(before, scene.tolerance * state.largest_approach):
         return step
-    return step._replace(difference=replace(step.difference, pressure=largest, force=largest, shared=0.0))
+    return step._replace(errors=replace(step.errors, pressure=largest, force=largest, shared=0.0))
 
 
 def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
     """Return the next accepted steps of a segment: a pair, or one step. The last step has the state after them."""
-    fine = state.fine
+    start = state.fine
     number = state.segment
     began, end = scene.program.corners[number : number + 2]
-    event = min(scene.next_kept(fine.time), end)
-    if fine.is_open and not fine.is_late:
+    event = min(scene.next_kept(start.time), end)
+    if start.is_open and not start.is_late:
         closes = closing_time(scene, state, segment, event)
-        if closes > fine.time:
+        if closes > start.time:
             return [step_while_open(scene, state, closes)]
     if scene.memory.is_elastic:
         if scene.adhesion is not None and scene.time_step is None:
             return [step_on_path(scene, state, segment, event)]
         longest = (end - began) / 20 if scene.kept is None else math.inf
-        parts = max(math.ceil((event - fine.time) / (scene.time_step or longest) * (1 - ROUNDED)), 1)
-        return [single_step(scene, state, fine.time + (event - fine.time) / parts if parts > 1 else event)]
+        parts = max(math.ceil((event - start.time) / (scene.time_step or longest) * (1 - ROUNDED)), 1)
+        return [single_step(scene, state, start.time + (event - start.time) / parts if parts > 1 else event)]
 
     former = scene.program.segments[number - 1] if number > 0 else segment
-    jumped = (former.duration == 0 or former.slide is not None) and not fine.is_open
+    jumped = (former.duration == 0 or former.slide is not None) and not start.is_open
     length = state.next_length or first_length(scene, segment, jumped)
     if segment.amplitude:
         length = min(length, segment.period / PAIRS_OF_A_CYCLE)
@@ -411,21 +412,21 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         state.peak,
     )
     while True:
-        middle, last = pair_ends(scene, number, fine.time, length, is_first=not state.next_length)
+        middle, last = pair_ends(scene, number, start.time, length, is_first=not state.next_length)
         # without kept times the end of each pair is a row
-        times = (last,) if scene.kept is None else scene.kept_within(fine.time, last)
+        times = (last,) if scene.kept is None else scene.kept_within(start.time, last)
         pair, at_end, coarse_at_end = solve_pair(scene, state, middle, last, has_row=bool(times))
         slide = scene.motions[number] if times else None
-        error = difference(scene, fine, at_end, coarse_at_end, slide, is_kept=bool(times))
-        if times and not pair.is_soft:  # a pair without a kept row adds nothing to this error
-            error = replace(error, shared=shared_error_of_entered(scene, fine, pair.second))
+        error = difference(scene, start, at_end, coarse_at_end, slide, is_kept=bool(times))
+        if times and not pair.is_soft:  # only pairs with a kept row add to the shared error
+            error = replace(error, shared=shared_error_of_entered(scene, start, pair.second))
         if scene.time_step is not None:
             next_length = length
             break
-        shared = error.shared + state.difference.shared * scene.memory.remaining(pair.length)
+        shared = error.shared + state.errors.shared * scene.memory.remaining(pair.length)
         ratio, at_row = errors_over_allowed(scene, pair, number, error, shared, scales, has_row=bool(times))
-        loses_contact = not fine.is_open and (pair.first.is_open or pair.second.is_open)
-        opens = not by_load and loses_contact and pair.second.approach >= fine.approach
+        loses_contact = not start.is_open and (pair.first.is_open or pair.second.is_open)
+        opens = not by_load and loses_contact and pair.second.approach >= start.approach
         is_stiff = scene.memory.grows(GROW * pair.length, STIFF)
         again, proposed = controller.judge(pair.length, ratio, at_row, opens=opens, is_stiff=is_stiff)
         if again is None:
@@ -435,24 +436,25 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         length = proposed
         del pair, at_end, coarse_at_end  # frees their memory while the pair is repeated
 
+    # the largest growth of the next pair
     growth = LARGEST_GROWTH if controller.refused < math.inf else GROW
     return accepted(scene, replace(state, growth=growth), pair, at_end, times, error, next_length)
 
 
 def solve_pair(scene: Scene, state: State, middle: float, last: float, *, has_row: bool) -> tuple[Pair, Point, Point]:
     """Return a pair of steps, and both solutions at its end with the pressures at that time if it has a kept row."""
-    fine = state.fine
+    start = state.fine
     coarse = state.coarse or state.fine
     number = state.segment
-    is_soft = scene.memory.grows(last - fine.time, SOFT)
+    is_soft = scene.memory.grows(last - start.time, SOFT)
     needs_pressure = has_row and is_soft
     solver_part = END_STEP if needs_pressure else SOLVER_PART
-    first = take_step(scene, fine, middle, number, solver_part=solver_part)
+    first = take_step(scene, start, middle, number, solver_part=solver_part)
     second = take_step(scene, first, last, number, solver_part=solver_part)
     coarse_end = take_step(
-        scene, coarse, last, number, guess=with_difference(second, coarse, fine), solver_part=solver_part
+        scene, coarse, last, number, guess=with_difference(second, coarse, start), solver_part=solver_part
     )
-    pair = Pair(fine, coarse, first, second, coarse_end, is_soft)
+    pair = Pair(start, coarse, first, second, coarse_end, is_soft)
     if not needs_pressure:
         return pair, second, coarse_end
     return (
@@ -484,35 +486,35 @@ def accepted(
     times : tuple of float
         Kept times of the pair. [s]
     error : StepErrors
-        Error that the pair states at its end.
+        Error of the pair at its end, without the errors before it.
     next_length : float
         Length of the next pair. [s]
     """
-    fine = pair.start
+    start = pair.start
     memory = scene.memory
     number = state.segment
-    former = state.difference
+    former = state.errors
     slide = scene.motions[number]
 
     def with_former(error: StepErrors, point: Point) -> StepErrors:
-        left = memory.remaining(point.time - fine.time)
+        left = memory.remaining(point.time - start.time)
         of_friction = 0.0
         if slide is not None and former.friction > 0:
-            of_friction, unresolved = left_of_friction(scene, fine, point, slide)
+            of_friction, unresolved = left_of_friction(scene, start, point, slide)
             error = replace(error, friction=max(error.friction, unresolved))
         return error.at_least(former, left, of_friction, is_soft=pair.is_soft)
 
     def with_late_entry(error: StepErrors, point: Point) -> StepErrors:
         if not pair.is_soft:
             return error
-        uncertain = error_of_late_entry(scene, fine, point, error.gap, state.entered)
+        uncertain = error_of_late_entry(scene, start, point, stated.gap, state.entered)
         return replace(error, shared=max(error.shared, uncertain))
 
-    error = with_former(error, pair.second)
+    stated = with_former(error, pair.second)
     entered = state.entered
-    force = force_of_entered(scene, fine, pair.second) if pair.is_soft else 0.0
+    force = force_of_entered(scene, start, pair.second) if pair.is_soft else 0.0
     if force > 0:
-        earlier = entered[0] if abs(fine.approach - entered[1]) <= error.gap else 0.0
+        earlier = entered[0] if abs(start.approach - entered[1]) <= stated.gap else 0.0
         entered = (earlier + force, pair.second.approach)
 
     inside = [row_at_middle(scene, pair, number) if pair.first.time in times else pair.first]
@@ -520,19 +522,19 @@ def accepted(
         if time not in (pair.first.time, pair.second.time):
             inside.append(row_inside(scene, pair, time, number))
     inside.sort(key=lambda point: point.time)
-    follows_corner = fine.time == scene.program.corners[number]
-    works, work_error, last_error = work_of_pair(scene, fine, pair.first, pair.second, inside)
+    follows_corner = start.time == scene.program.corners[number]
+    works, work_error, last_error = work_of_pair(scene, start, pair.first, pair.second, inside)
     by_load = scene.program.segments[number].control == "load"
     relaxing = 0.0
-    if follows_corner and not fine.is_late:
-        relaxing = transient_error(scene, fine, pair.first, pair.second, by_load=by_load)
+    if follows_corner and not start.is_late:
+        relaxing = transient_error(scene, start, pair.first, pair.second, by_load=by_load)
     after = after_steps(
         scene,
         state,
         [pair.first, pair.second],
         pair.coarse_end,
         next_length,
-        difference=error,
+        errors=stated,
         work=state.work + works[-1],
         work_curved=math.hypot(state.work_curved, last_error),
         work_relaxed=state.work_relaxed + relaxing,
@@ -542,18 +544,19 @@ def accepted(
     steps = []
     of_work = max(state.work_difference, after.work_difference, key=abs)
     for point, work in zip(inside, works[:-1], strict=True):
-        left = 1.0 if pair.is_soft else memory.remaining(point.time - fine.time)
-        # at the end of a soft pair the difference contains this force; otherwise its error is what both share
-        uncertain = uncertain_force_of_entered(scene, fine, point)
-        uncertain = uncertain if pair.is_soft else max(uncertain, shared_error_of_entered(scene, fine, point))
-        between = with_former(replace(error.or_larger(former, left), shared=uncertain), point)
+        left = 1.0 if pair.is_soft else memory.remaining(point.time - start.time)
+        # No coarse solution at this time shows the uncertain force. At the end of a soft pair the difference contains
+        # it; at the end of another pair only the shared part counts.
+        uncertain = uncertain_force_of_entered(scene, start, point)
+        uncertain = uncertain if pair.is_soft else max(uncertain, shared_error_of_entered(scene, start, point))
+        between = with_former(replace(stated.or_larger(former, left), shared=uncertain), point)
         between = with_late_entry(between, point)
         curved = math.hypot(state.work_curved, work_error if point.time <= pair.first.time else last_error)
         within = replace(
             state, work=state.work + work, work_curved=curved, work_difference=of_work, work_relaxed=after.work_relaxed
         )
         steps.append(Step(point, between, number, within, is_end=False))
-    return [*steps, Step(at_end, with_late_entry(error, at_end), number, after)]
+    return [*steps, Step(at_end, with_late_entry(stated, at_end), number, after)]
 
 
 def row_at_middle(scene: Scene, pair: Pair, number: int) -> Point:
@@ -608,7 +611,7 @@ def after_steps(
     next_length : float
         Length of the next pair. [s]
     **totals
-        Other attributes of the new state: difference, work and its error, distance.
+        Other attributes of the new state: errors, work and its error, distance.
     """
     fine = points[-1]
     of_work = 0.0
@@ -679,30 +682,30 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
     relaxed = memory.remaining(last.time - fine.time)
     shared = 0.0
     if count == 1 and not memory.is_elastic:  # the coarse solution takes the same step: both share its error
-        former = state.difference.pressure
+        former = state.errors.pressure
         if cells == 1:
             former = UNBOUNDED * float(abs(last.pressure - moved(fine.pressure, 1)).sum()) * grid.cell_area
         shared = max(former - error.pressure, 0.0)
-        error = replace(error.or_larger(state.difference), pressure=error.pressure)
+        error = replace(error.or_larger(state.errors), pressure=error.pressure)
     if cells == 1 and not memory.is_elastic:  # a solution with longer steps does not exist
         error = replace(error, friction=abs(friction(scene, last, slide)))
-    error = replace(error, shared=shared).at_least(state.difference, relaxed)
+    error = replace(error, shared=shared).at_least(state.errors, relaxed)
     step = points[1].time - fine.time
     skipped = 0.0
     if taken == 0 and not memory.is_elastic:  # a long first step is of first order, and the next one corrects it
         change = abs(friction(scene, points[1], slide) - friction(scene, last, slide))
         skipped = skipped_friction(scene, body_under(fine, 1), points[1], slide, step)
         skipped = max(skipped, change * (1 - memory.remaining(step)))
-    carried = max(LASTING * state.difference.friction, skipped if count == 1 else skipped * memory.remaining(step))
+    carried = max(LASTING * state.errors.friction, skipped if count == 1 else skipped * memory.remaining(step))
     of_friction = max(error.friction, carried, phase_error(scene, last, slide, step))  # each step makes a new error
     error = replace(error, friction=of_friction)
     work = state.work + works[-1]
     distance = state.distance + count * side
-    after = after_steps(scene, state, points[1:], coarse_end, difference=error, work=work, distance=distance)
+    after = after_steps(scene, state, points[1:], coarse_end, errors=error, work=work, distance=distance)
     of_work = max(state.work_difference, after.work_difference, key=abs)
     inside = replace(state, work=state.work + works[1], work_difference=of_work, distance=state.distance + side)
     ends = Step(last, error, state.segment, after)
-    between = error.or_larger(state.difference)
+    between = error.or_larger(state.errors)
     between = replace(between, friction=max(between.friction, skipped))
     if taken == 0 and not memory.is_elastic:
         missed = skipped_pressure(scene, body_under(fine, 1), points[1], step)

@@ -125,6 +125,6 @@ def test_row_just_before_an_imprint_closes__states_the_force_to_which_it_jumps()
     )
     assert before.point.force == 0
     assert after.point.force > 0.05 * before.state.largest_force
-    assert before.difference.force >= after.point.force
+    assert before.errors.force >= after.point.force
     (early,) = (one for one in march(sphere(program, body, times=(apart - 2e-3,))) if one.point.time == apart - 2e-3)
-    assert early.point.force == early.difference.force == 0
+    assert early.point.force == early.errors.force == 0

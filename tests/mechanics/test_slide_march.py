@@ -138,7 +138,7 @@ def test_partial_contact__settles_at_what_steady_sliding_finds(speed):
     got = force(found, steps[-1])
     assert got == pytest.approx(exact.power_force, rel=5e-3)
     off = abs(got - exact.power_force)
-    assert off <= steps[-1].difference.friction < max(10 * off, 2e-3 * got)  # at 0.16 the error passes through zero
+    assert off <= steps[-1].errors.friction < max(10 * off, 2e-3 * got)  # at 0.16 the error passes through zero
     after = steps[-1]
     by_slopes = float(np.sum(after.point.pressure * slope(found.gap, PERIOD / 128, 0))) * found.grid.cell_area
     assert by_slopes == pytest.approx(got, rel=5e-3)
@@ -173,7 +173,7 @@ def test_held_approach__keeps_it_and_finds_the_force():
 def test_slide__carries_the_error_of_cells_that_have_entered():
     program = rv.Program().load(2e-3, over=0.1).slide(0.2 * PERIOD, speed=0.1)
     steps = list(march(scene(rough((32, 24)), rubber(), program, times=(0.1,), tolerance=0.1)))
-    assert 0 < steps[-1].difference.shared < next(step for step in steps if step.point.time == 0.1).difference.shared
+    assert 0 < steps[-1].errors.shared < next(step for step in steps if step.point.time == 0.1).errors.shared
 
 
 def test_slow_slide__is_not_frozen_by_the_tolerance():
