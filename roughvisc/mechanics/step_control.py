@@ -232,9 +232,10 @@ def errors_over_allowed(
 ) -> tuple[float, float]:
     """Return the error that a pair adds at the next kept time, over the allowed error, and its error at a kept row.
 
-    The second one is relative to the tolerance, and zero if the pair may not be repeated for it. Errors are relative to
-    the largest force and approach of the kept rows, of the pair, and of the next row as far as it is known. An approach
-    counts as at least its rounding error: a flat periodic surface has no larger approach.
+    If the pair has a kept row, the first one is that at its end. The second one is relative to the tolerance, and zero
+    if the pair may not be repeated for it. Errors are relative to the largest force and approach of the kept rows, of
+    the pair, and of the next row as far as it is known. An approach counts as at least its rounding error: a flat
+    periodic surface has no larger approach.
 
     Parameters
     ----------
@@ -247,7 +248,7 @@ def errors_over_allowed(
     error : StepErrors
         Stated error at the end of the pair.
     shared : float
-        Error of the pressure that both solutions share. [N]
+        Error of the pressure that both solutions share, with what relaxation leaves of it from before the pair. [N]
     of_rows : Scales
         Forces and approaches until the pair.
     has_row : bool

@@ -436,7 +436,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         length = proposed
         del pair, at_end, coarse_at_end  # frees their memory while the pair is repeated
 
-    # the largest growth of the next pair
+    # the largest growth after the next pair
     growth = LARGEST_GROWTH if controller.refused < math.inf else GROW
     return accepted(scene, replace(state, growth=growth), pair, at_end, times, error, next_length)
 
@@ -523,7 +523,7 @@ def accepted(
             inside.append(row_inside(scene, pair, time, number))
     inside.sort(key=lambda point: point.time)
     follows_corner = start.time == scene.program.corners[number]
-    works, work_error, last_error = work_of_pair(scene, start, pair.first, pair.second, inside)
+    works, first_error, last_error = work_of_pair(scene, start, pair.first, pair.second, inside)
     by_load = scene.program.segments[number].control == "load"
     relaxing = 0.0
     if follows_corner and not start.is_late:
@@ -549,9 +549,10 @@ def accepted(
         # it; at the end of another pair only the shared part counts.
         uncertain = uncertain_force_of_entered(scene, start, point)
         uncertain = uncertain if pair.is_soft else max(uncertain, shared_error_of_entered(scene, start, point))
+        # the larger errors contain the former ones; `with_former` adds the shared one, replaced here, and friction
         between = with_former(replace(stated.or_larger(former, left), shared=uncertain), point)
         between = with_late_entry(between, point)
-        curved = math.hypot(state.work_curved, work_error if point.time <= pair.first.time else last_error)
+        curved = math.hypot(state.work_curved, first_error if point.time <= pair.first.time else last_error)
         within = replace(
             state, work=state.work + work, work_curved=curved, work_difference=of_work, work_relaxed=after.work_relaxed
         )
