@@ -248,7 +248,7 @@ def errors_over_allowed(
     error : StepErrors
         Stated error at the end of the pair.
     shared : float
-        Error of the pressure that both solutions share, with what relaxation leaves of it from before the pair. [N]
+        Error of the pressure that both solutions share, what is left from before the pair included. [N]
     of_rows : Scales
         Forces and approaches until the pair.
     has_row : bool
@@ -274,14 +274,14 @@ def errors_over_allowed(
     following = second.time if has_row else min(scene.next_kept(second.time), scene.program.duration)
     rise = rise_until(scene, number, second, following)
     expected = 0.0 if has_row else force_ahead(scene, pair, following, of_rows)
-    # under a load the approach grows at least as the root of the load, as that of a cone
+    # under a load the approach grows at least as the root of the load: a cone
     scales = max(force, second.size * rise, expected), max(approach, abs(second.approach) * rise**0.5)
     allowed = ALLOWED_SOFT if scene.is_soft else ALLOWED
     return added_error(scene, pair, number, following, scales) / (allowed * scene.tolerance), row
 
 
 def force_ahead(scene: Scene, pair: Pair, following: float, of_rows: Scales) -> float:
-    """Return the force that divides the error at the next kept time; zero if nothing is known of it. [N]
+    """Return the force that divides the error at the next kept time, as far as the program tells; else zero. [N]
 
     - Under a load: the prescribed load.
     - Under an approach that grows until then: the force grows at least in proportion to the approach, and from the
