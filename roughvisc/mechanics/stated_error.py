@@ -33,9 +33,13 @@ from roughvisc.mechanics.tangential import tangential_force
 #: steps are of first order.
 STATED = (0.6, 0.6)
 STATED_SOFT = (1.0, 1.5)
-#: Least stated error after a pair, over the part of the error before the pair that relaxation leaves.
+#: Least stated error after a pair, over the part of the error before the pair that relaxation leaves: a difference that
+#: passes through zero states nothing (`test_row_at_which_both_solutions_meet`). On random scenes it raises the median
+#: of stated over true error by 3 % (`closed_forms.py cells-many cells-one slides`).
 LASTING = 0.5
-#: Uncertain part of the pressure of a cell that has just entered the contact, if the pressure is due to creep.
+#: Uncertain part of the pressure of a cell that has just entered the contact, if the pressure is due to creep. Without
+#: this part and the shared one, rows are up to 1.7 times beyond their stated error where a crest enters within a step
+#: (`test_entering_cells.py`).
 UNCERTAIN_OF_ENTERED = 0.3
 #: Error of this pressure that both solutions of a pair may share, as a part of the pressure times the square of the
 #: creep in the pair over the instantaneous compliance; at most the pressure itself. Measured on random contacts of
