@@ -35,7 +35,7 @@ STATED = (0.6, 0.6)
 STATED_SOFT = (1.0, 1.5)
 #: Least stated error after a pair, over the part of the error before the pair that relaxation leaves: a difference that
 #: passes through zero states nothing (`test_row_at_which_both_solutions_meet`). On random scenes it raises the median
-#: of stated over true error by 3 % (`closed_forms.py cells-many cells-one slides`).
+#: of stated over true error by 1 to 4 % (`closed_forms.py cells-many cells-one slides`).
 LASTING = 0.5
 #: Uncertain part of the pressure of a cell that has just entered the contact, if the pressure is due to creep. Without
 #: this part and the shared one, rows are up to 1.7 times beyond their stated error where a crest enters within a step
