@@ -161,7 +161,7 @@ class Controller:
         misses = 1 < at_row < self.refused_at_row and ratio > 1  # else the error is from before the pair
         if taken > self.shortest:
             refused = replace(self, refused=ratio, tried=max(self.tried, taken))
-            if opens:  # a smaller error is no condition here
+            if opens:  # whether or not the last trial had a larger error
                 return self, SHRINK * taken
             if is_too_long:
                 return refused, taken * max(factor, SHRINK)
@@ -265,7 +265,7 @@ def errors_over_allowed(
 
     row = 0.0
     factor, factor_of_approach = stated_over_difference(scene)
-    # a pair that is short for its place in the segment is not repeated, see FIRST_PAIR
+    # a pair that is short for its place in the segment is not repeated: see FIRST_PAIR
     if has_row and scene.keeps(second.time) and taken > FIRST_PAIR * (second.time - scene.program.corners[number]):
         # the whole difference, or the stated error with the shared one, whichever is larger
         of_pressure = max(error.pressure / factor, error.pressure + shared) / force
@@ -289,7 +289,7 @@ def force_ahead(scene: Scene, pair: Pair, following: float, of_rows: Scales) -> 
     - If the surfaces are surely apart then, any error of the pressure is gone: the largest force of all steps.
     - If the present rates of force and approach lead to open surfaces: the peak, because the contact may last longer.
 
-    With adhesion no surfaces are apart, and nothing is known.
+    With adhesion surfaces are never without force, and zero is returned.
 
     Parameters
     ----------

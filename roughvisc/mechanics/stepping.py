@@ -413,7 +413,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
     )
     while True:
         middle, last = pair_ends(scene, number, start.time, length, is_first=not state.next_length)
-        # without kept times the end of each pair is a row
+        # if no times are given, the end of each pair is a row
         times = (last,) if scene.kept is None else scene.kept_within(start.time, last)
         pair, at_end, coarse_at_end = solve_pair(scene, state, middle, last, has_row=bool(times))
         slide = scene.motions[number] if times else None

@@ -26,7 +26,7 @@ from roughvisc.variables import AXES, VARIABLES, axis_of
 _VISIBLE = 0.01
 #: Largest number of rows for which dots are drawn.
 _DOTS = 40
-#: Places of the label of a point, around it [pt], and half of the room that a label takes, both axes.
+#: Offsets at which the label of a point may stand, and half of the width and height that a label needs. [pt]
 _OFFSETS = ((0.0, 7.0), (0.0, -7.0), (14.0, 0.0), (-14.0, 0.0))
 _LABEL = (16.0, 7.0)
 
