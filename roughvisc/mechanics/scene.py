@@ -133,6 +133,12 @@ class Scene:
         kept = self.kept or ()
         return kept[bisect_right(kept, after) : bisect_right(kept, until)]
 
+    def last_kept(self, time: float) -> float:
+        """Return the last kept time up to a time [s]; minus infinity if there is none, or if every step is kept."""
+        kept = self.kept or ()
+        index = bisect_right(kept, time)
+        return kept[index - 1] if index else -math.inf
+
     def next_kept(self, time: float) -> float:
         """Return the first kept time after a time; infinite if there is none, or if every step is kept. [s]"""
         kept = self.kept or ()
@@ -175,6 +181,11 @@ class Packed:
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         return np.asarray(self.get().field(), dtype)
+
+
+def unpacked(field: Array | Packed) -> Array:
+    """Return a field at all cells."""
+    return field.field() if isinstance(field, Packed) else field
 
 
 @dataclass(frozen=True)
@@ -224,7 +235,7 @@ class Point:
     @property
     def pressure(self) -> Array:
         """Pressure at all cells, shape (nx, ny). [Pa]"""
-        return self.stored_pressure.field() if isinstance(self.stored_pressure, Packed) else self.stored_pressure
+        return unpacked(self.stored_pressure)
 
     @property
     def contact(self) -> Array:

@@ -15,7 +15,7 @@ controls the length of the pair too, and a short additional step gives the press
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -26,7 +26,8 @@ from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.mechanics.adhesive_step import GROWTH, JUMP, dissipated, longest_step, step_with_adhesion
 from roughvisc.mechanics.contact.adhesive import Unstable
 from roughvisc.mechanics.contact.solver import solve_contact
-from roughvisc.mechanics.memory import LARGEST_GROWTH, STIFF, Rule
+from roughvisc.mechanics.first_guess import Known, best_weights, combination
+from roughvisc.mechanics.memory import LARGEST_GROWTH, STIFF, Prediction, Rule
 from roughvisc.mechanics.program import Segment, Slide, instant
 from roughvisc.mechanics.scene import SOFT, Array, Packed, Point, Scene
 from roughvisc.mechanics.stated_error import (
@@ -61,9 +62,6 @@ from roughvisc.mechanics.step_control import (
     pair_ends,
     shortest_length,
 )
-
-#: First guess of a step: pressure [Pa], and its displacement per unit compliance [m Pa] or None.
-Guess = tuple[Array, Array | None]
 
 #: A surface with at least this number of cells stores the pressure of its contact cells only, if they are less than
 #: half of all cells.
@@ -303,7 +301,7 @@ def single_step(scene: Scene, state: State, time: float, *, may_refuse: bool = F
     new = other = take_step(scene, fine, time, number, rule="linear", may_refuse=may_refuse)
     if coarse is not fine:
         rule: Rule | None = "linear" if coarse.is_open else None
-        other = take_step(scene, coarse, time, number, guess=with_difference(new, coarse, fine), rule=rule)
+        other = take_step(scene, coarse, time, number, known=with_difference(new, coarse, fine), rule=rule)
     error = difference(scene, fine, new, other, scene.motions[number], is_kept=scene.keeps(time))
     left = scene.memory.remaining(time - fine.time)
     lasting = error.at_least(state.errors, left)
@@ -452,7 +450,7 @@ def solve_pair(scene: Scene, state: State, middle: float, last: float, *, has_ro
     first = take_step(scene, start, middle, number, solver_part=solver_part)
     second = take_step(scene, first, last, number, solver_part=solver_part)
     coarse_end = take_step(
-        scene, coarse, last, number, guess=with_difference(second, coarse, start), solver_part=solver_part
+        scene, coarse, last, number, known=with_difference(second, coarse, start), solver_part=solver_part
     )
     pair = Pair(start, coarse, first, second, coarse_end, is_soft)
     if not needs_pressure:
@@ -569,10 +567,12 @@ def row_inside(scene: Scene, pair: Pair, time: float, number: int) -> Point:
     """Return the solution at a kept time inside a pair [s], one step from the point of the fine solution before it."""
     start, end = (pair.start, pair.first) if time < pair.first.time else (pair.first, pair.second)
     weight = (time - start.time) / (end.time - start.time)
-    pressure = (1 - weight) * start.pressure + weight * end.pressure
-    unit = (1 - weight) * start.history.fields[0] + weight * end.history.fields[0]
+    known = (
+        Known(end.stored_pressure, end.history.fields[0], weight),
+        Known(start.stored_pressure, start.history.fields[0], 1 - weight),
+    )
     solver_part = END_STEP if pair.is_soft else SOLVER_PART
-    row = take_step(scene, start, time, number, guess=(pressure, unit), solver_part=solver_part)
+    row = take_step(scene, start, time, number, known=known, solver_part=solver_part)
     return with_final_pressure(scene, start, row, number) if pair.is_soft else row
 
 
@@ -664,15 +664,15 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
         history = memory.roll(here.history, slide.sense * number, slide.axis)
         return replace(here, history=history, stored_pressure=moved(here.pressure, number), previous=None)
 
-    def over(here: Point, number: int, time: float, guess: Guess) -> Point:
-        return take_step(scene, body_under(here, number), time, state.segment, guess=guess, solver_part=SLIDING_PART)
+    def over(here: Point, number: int, time: float, known: Sequence[Known]) -> Point:
+        return take_step(scene, body_under(here, number), time, state.segment, known=known, solver_part=SLIDING_PART)
 
     points = [fine]
     works = [0.0]
     for number in range(1, count + 1):
         here = points[-1]
         time = instant(began, end, taken + number, cells)
-        points.append(over(here, 1, time, (here.pressure, here.history.fields[0])))
+        points.append(over(here, 1, time, [Known(here.stored_pressure, here.history.fields[0], 1.0)]))
         works.append(works[-1] + work_of_step(scene, here, points[-1], slides=True))
     coarse_end = last = points[-1]
     if coarse is not fine or count == 2:
@@ -723,7 +723,7 @@ def take_step(
     time: float,
     number: int,
     value: float | None = None,
-    guess: Guess | None = None,
+    known: Sequence[Known] | None = None,
     rule: Rule | None = None,
     solver_part: float = SOLVER_PART,
     *,
@@ -743,8 +743,8 @@ def take_step(
         Index of the segment.
     value : float, optional
         Load or approach at the end. Default: the prescribed value of the segment. [N or m]
-    guess : tuple of array, optional
-        First guess: pressure [Pa], and its displacement per unit compliance [m Pa]. Default: extrapolation.
+    known : sequence of Known, optional
+        Pressures that the first guess combines. Default: those of this point and of the one before it.
     rule : {"linear", "bdf2", "constant"}, optional
         Rule of the memory.
     solver_part : float
@@ -777,13 +777,8 @@ def take_step(
         nothing = grid.xp.zeros(gap.shape)
         history = memory.advance(here.history, prediction, nothing, nothing)
         return Point(time, nothing, 0.0, lowest if by_load else value, history, previous, here.start)
-    pressure, unit = guess or (here.pressure, unit_before)
-    if guess is None and here.previous is not None and step > 0:
-        # Extrapolate from the last two points.
-        then, stored, former_unit = here.previous
-        ratio = step / (here.time - then)
-        pressure = pressure + ratio * (pressure - replace(here, stored_pressure=stored).pressure)
-        unit = None if unit is None or pressure.min() < 0 else unit + ratio * (unit - former_unit)
+    if known is None:
+        known = extrapolated(here, step)
     tolerance = max(solver_part * scene.tolerance, 1e-10)
     if scene.adhesion is not None:
         return step_with_adhesion(
@@ -793,20 +788,16 @@ def take_step(
             value,
             prediction,
             gap,
-            pressure,
+            combination(known, [one.weight for one in known]),
             previous,
             tolerance,
             by_load=by_load,
             may_refuse=may_refuse,
         )
     # the solver takes pressures over the contact modulus, which is 1 / alpha here
-    start = dict[str, Any]()
-    if guess or not here.is_open:  # otherwise the first guess would be zero
-        pressure = alpha * pressure
-        unit = alpha * unit if prediction.grid is None and unit is not None else None
-        start = {"start": pressure, "start_displacement": unit}
-    del pressure, unit
     given: dict[str, Any] = {"load": value * alpha / area} if by_load else {"approach": value}
+    start = first_guess(known, prediction, gap, **{"load": value / area} if by_load else given)
+    del known
     try:
         contact = solve_contact(grid, gap, tolerance=tolerance, **start, **given, overwrite=True, present=scene.present)
     except ConvergenceError as error:
@@ -838,17 +829,54 @@ def take_step(
     )
 
 
-def with_difference(second: Point, coarse: Point, fine: Point) -> Guess:
-    """Return a first guess of the coarse solution: pressure, and its displacement per unit compliance. [Pa, m Pa]
+def first_guess(known: Sequence[Known], prediction: Prediction, gap: Array, **given: float) -> dict[str, Any]:
+    """Return the arguments of :func:`solve_contact` that state the first guess of a step; none from open surfaces.
 
-    It is the fine solution at the end of the step, plus the difference between both solutions before the step. The
-    displacement is not used if the kernel depends on the step.
+    Parameters
+    ----------
+    known : sequence of Known
+        Pressures that the guess combines.
+    prediction : Prediction
+        Elastic problem of the step.
+    gap : array, shape (nx, ny)
+        Gap without pressure in the step at zero approach. [m]
+    **given
+        Sum of the pressure over the cells [Pa], or approach [m].
     """
-    unit = second.history.fields[0]
-    if coarse is fine:
-        return second.pressure, unit
-    unit_difference = coarse.history.fields[0] - fine.history.fields[0]
-    return second.pressure + (coarse.pressure - fine.pressure), unit + unit_difference
+    known = [one for one in known if one.pressure.any()]
+    if not known:
+        return {}
+    alpha = prediction.compliance
+    is_known = prediction.grid is None
+    weights = best_weights(known, alpha, gap, **given) if is_known else [one.weight for one in known]
+    weights = [alpha * weight for weight in weights]
+    start = combination(known, weights)
+    if not is_known or start.min() < 0:  # the displacement would belong to the negative pressures too
+        return {"start": start}
+    return {"start": start, "start_displacement": combination(known, weights, of_displacement=True)}
+
+
+def extrapolated(here: Point, step: float) -> list[Known]:
+    """Return the pressures of a point and of the one before it, for a step [s] that extrapolates them."""
+    if here.previous is None or step == 0:
+        return [Known(here.stored_pressure, here.history.fields[0], 1.0)]
+    then, stored, displacement = here.previous
+    ratio = step / (here.time - then)
+    return [
+        Known(here.stored_pressure, here.history.fields[0], 1 + ratio),
+        Known(stored, displacement, -ratio),
+    ]
+
+
+def with_difference(second: Point, coarse: Point, fine: Point) -> list[Known]:
+    """Return the pressures that a first guess of the coarse solution combines.
+
+    They are the fine solution at the end of the step, and the difference between both solutions before the step.
+    """
+    points = [(second, 1.0)]
+    if coarse is not fine:
+        points += [(coarse, 1.0), (fine, -1.0)]
+    return [Known(point.stored_pressure, point.history.fields[0], weight) for point, weight in points]
 
 
 def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> float:

@@ -1,0 +1,74 @@
+"""First guess of a step: the combination of known pressures with the least energy."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support import rough_gap
+
+from roughvisc.mechanics.first_guess import Known, best_weights, combination
+from roughvisc.mechanics.grid import Grid
+
+
+def known(grid, *pressures):
+    return [Known(pressure, grid.displacement(pressure), math.nan) for pressure in pressures]
+
+
+@pytest.mark.parametrize("shape", [(16, 9), (15, 21)])
+def test_full_contact_of_a_wave__is_solved_exactly(shape):
+    """The pressure of a wave in full contact is uniform plus a wave, in proportion to the modulus (Westergaard)."""
+    grid = Grid(shape, (1.0, 1.3), "periodic")
+    wave = np.cos(2 * np.pi * np.arange(shape[0]) / shape[0])[:, None] * np.ones(shape[1])
+    of_wave = float((grid.displacement(wave) / wave)[0, 0])
+    compliance, depth, mean = 0.7, 0.2, 3.0
+    exact = mean + depth / (compliance * of_wave) * wave
+    fields = known(grid, np.ones(shape) + 0.1 * wave, np.full(shape, 2.0) - 0.3 * wave)
+    weights = best_weights(fields, compliance, -depth * wave, load=mean * wave.size)
+    np.testing.assert_allclose(combination(fields, weights), exact, rtol=1e-10)
+    displaced = combination(fields, weights, of_displacement=True)
+    np.testing.assert_allclose(displaced, grid.displacement(exact), rtol=0, atol=1e-10 * abs(displaced).max())
+
+
+@given(
+    seed=st.integers(0, 999),
+    count=st.integers(1, 3),
+    boundary=st.sampled_from(["free", "periodic"]),
+    is_load=st.booleans(),
+    scale=st.floats(-9, 9),
+)
+def test_energy__is_the_least_of_all_combinations(seed, count, boundary, is_load, scale):
+    rng = np.random.default_rng(seed)
+    grid = Grid((9, 12), (1.0, 0.8), boundary)
+    fields = known(grid, *rng.random((count, *grid.shape)))
+    compliance = 10.0**scale
+    gap = compliance * rough_gap(grid.shape, seed)
+    control = {"load": 2.0} if is_load else {"approach": 0.3 * float(gap.max())}
+
+    def energy(weights):
+        pressure = combination(fields, weights)
+        work = control.get("approach", 0.0) * pressure.sum()
+        displaced = compliance * combination(fields, weights, of_displacement=True)
+        return 0.5 * (pressure * displaced).sum() + (pressure * gap).sum() - work
+
+    best = best_weights(fields, compliance, gap, **control)
+    if is_load:
+        assert combination(fields, best).sum() == pytest.approx(2.0, rel=1e-9)
+    for _ in range(5):
+        others = np.array(best) + 10.0 ** rng.uniform(-3, 0) * rng.normal(size=count) * (np.abs(best).max() + 1e-3)
+        if is_load:  # the same load
+            others *= 2.0 / combination(fields, others).sum()
+        assert energy(best) <= energy(others) + 1e-9 * abs(energy(others))
+
+
+def test_equal_pressures__change_nothing():
+    """A pressure that repeats another one, to rounding, gives no direction of its own."""
+    grid = Grid((9, 12), (1.0, 0.8))
+    pressure = np.random.default_rng(1).random(grid.shape)
+    gap = rough_gap(grid.shape, 1)
+    once, twice = known(grid, pressure), known(grid, pressure, pressure * (1 + 1e-15))
+    for control in ({"load": 2.0}, {"approach": 0.5}):
+        alone = combination(once, best_weights(once, 1.0, gap, **control))
+        both = combination(twice, best_weights(twice, 1.0, gap, **control))
+        np.testing.assert_allclose(both, alone, rtol=1e-9)
