@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy import optimize
 
 import roughvisc as rv
 from roughvisc.mechanics.body import Body
@@ -114,6 +115,16 @@ def test_rows_after_a_fast_relaxation(ratio):
     ds, error = held(1e-6 / ratio, (1e-6, 2e-6), (1e-6, 0.3), 1.0, np.geomspace(1e-3, 1.0, 10).tolist(), 1e-4)
     assert_states_enough(ds, error)
     assert error.max() < 5e-4
+
+
+@pytest.mark.parametrize("left", [0.3, 0.1, 0.03])
+def test_row_at_the_end_of_a_long_relaxation(left):
+    """The errors of twenty pairs and more add up: as errors of the force they relax no faster than the force."""
+    compliances = 1e-6, (80e-6,)
+    age = float(optimize.brentq(lambda t: relaxation(*compliances, (1.0,))(t) - left, 0.0, 5.0))
+    ds, error = held(*compliances, (1.0,), 5.0, [age], 1e-4)
+    assert_states_enough(ds, error)
+    assert error[0] < 2e-4
 
 
 # -------------------------------------------------------------------------------------------------------------- slides
