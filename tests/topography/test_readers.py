@@ -1,6 +1,7 @@
 """Reading of scans: heights and positions from instrument files, grid files and surface cards."""
 
 import hashlib
+import io
 import json
 import random
 import re
@@ -182,6 +183,21 @@ def test_refusal__of_files_without_a_map_says_what_to_export(suffix, tmp_path):
     with refused("format", f".{suffix}") as caught:
         open_scan(tmp_path / f"a.{suffix}")
     assert "expected" in str(caught.value)
+
+
+@pytest.mark.parametrize("suffix", ["sur", "sdf", "csv", "dat", "opd", "tmd", "ply"])
+def test_refusal__of_another_suffix_names_the_format_of_the_content(suffix, tmp_path):
+    contents = {"x3p": (Path(__file__).parent / "misread" / "micron_5.x3p").read_bytes()}
+    heights = io.BytesIO()
+    np.save(heights, tilted())
+    contents["npy"] = heights.getvalue()
+    path = tmp_path / f"scan.{suffix}"
+    for format in ("x3p", "npy"):
+        path.write_bytes(contents[format])
+        with refused("format", f".{suffix}") as caught:
+            open_scan(path)
+        assert repr(format) in str(caught.value)
+    assert open_scan(path, format="npy", spacing=CELL, unit="m").size == tilted().size
 
 
 @real

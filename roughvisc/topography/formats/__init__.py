@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Callable, Sequence
+from contextlib import closing, suppress
 from functools import partial
 from pathlib import Path
 
@@ -36,6 +37,8 @@ READERS: dict[str, tuple[Sequence[str], Callable[[Path], ScanFile]]] = {
 }
 #: Formats to try, in this order, for suffixes that are also used for other content.
 _SHARED = {"dat": ("metropro", "txt"), "h5": ("nc", "h5")}
+#: Formats with a reader in this package that are recognised by their content.
+_BY_CONTENT = ("x3p", "sdf", "npy", "sur")
 #: Suffix -> kind of a file that no reader reads or that holds no heights, and what to export instead.
 _PICTURE = "a picture without heights: expected the heights, such as .x3p, .sur or a text matrix, from the instrument"
 _SHEET = "a spreadsheet: expected its sheet of heights as .csv, with unit and spacing"
@@ -87,7 +90,25 @@ def open_file(path: Path, format: str | None) -> ScanFile:
             failures.append(f"as {name}: {str(error) or type(error).__name__}")
     if format is None and (export := _EXPORTS.get(_suffix(path))):
         raise InputError(f"it is {export}", key="format", found=path.suffix)
+    if content := _format_of_content(path, names):
+        known = f"{content!r}, the format of the content"
+        raise InputError(key="format", found=format or path.suffix, expected=known)
     raise ValueError("; ".join(failures))
+
+
+def _format_of_content(path: Path, but: Sequence[str]) -> str | None:
+    """Return the format that can read a file, apart from some formats; None if none can."""
+    from SurfaceTopography.IO import detect_format
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for name in _BY_CONTENT:
+            with suppress(Exception), closing(READERS[name][1](path)):  # readers raise many types
+                return name
+        with suppress(Exception):
+            detected = str(detect_format(str(path)))
+            return None if detected in but else detected
+    return None
 
 
 def add_format(format: str, suffixes: Sequence[str] | str, read: Callable[[Path], ScanFile]) -> None:

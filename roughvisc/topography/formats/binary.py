@@ -100,7 +100,7 @@ def read_truemap(path: Path) -> ScanFile:
     """Read a TrueMap or GelSight file of version 2: a comment, then the grid in millimetres, top line first."""
     content = path.read_bytes()
     if not content.startswith(_TRUEMAP):
-        raise InputError(f"found {content[: len(_TRUEMAP)]!r} at its beginning: expected {_TRUEMAP.decode()!r}")
+        raise ValueError(f"found {content[: len(_TRUEMAP)]!r} at its beginning: expected {_TRUEMAP.decode()!r}")
     offset = content.index(b"\0", content.index(b"\0") + 1) + 1
     columns, rows, width, height = struct.unpack_from("<2I2f", content, offset)
     heights = np.frombuffer(content, "<f4", columns * rows, offset + 24).reshape(rows, columns).T.astype(float)
