@@ -146,6 +146,23 @@ def test_small_load__is_carried_by_the_highest_cell(boundary, material, exponent
         assert ratio == pytest.approx(love / (a * b), rel=2 * TOLERANCE)
 
 
+@pytest.mark.parametrize("scale", [1e-250, 1e250])
+def test_load_and_moduli_of_any_size__leave_the_same_contact(scale):
+    ball = rv.sphere(1e-2, 2e-3, 16)
+    usual, scaled = (
+        rv.simulate(
+            ball,
+            rv.zener(2e6 * size, 2e6 * size, 1e6 * size),
+            rv.Program().load(size, over=0.1).hold(1.0),
+            times=3,
+            progress=False,
+        )
+        for size in (1.0, scale)
+    )
+    np.testing.assert_allclose(scaled.approach, usual.approach, rtol=1e-3)
+    np.testing.assert_array_equal(scaled.contact_area, usual.contact_area)
+
+
 @pytest.mark.parametrize("load", [1.0, 1e12])
 @pytest.mark.parametrize("boundary", ["free", "periodic"])
 def test_large_load__makes_full_contact_and_no_more(boundary, load):

@@ -21,7 +21,7 @@ from roughvisc.mechanics.materials.models import creep_series
 from roughvisc.mechanics.memory import SERIES_SHARE, Memory, choose_memory
 from roughvisc.mechanics.program import Program
 from roughvisc.mechanics.scene import Scene
-from roughvisc.mechanics.step_control import SHORTEST_PAIR
+from roughvisc.mechanics.step_control import SHORTEST_PAIR, least_approach
 from roughvisc.mechanics.stepping import Step
 from roughvisc.settings import Settings
 from roughvisc.topography.borders import JUMP, border_mismatch
@@ -180,7 +180,7 @@ def error_columns(step: Step, scene: Scene) -> dict[str, float]:
     stepped = error.pressure + error.shared
     pressure = (stepped + solved * point.size + of_force) / largest_force if largest_force > 0 else solved
     per_force = largest_force or math.inf
-    per_approach = largest_approach or math.inf
+    per_approach = max(largest_approach or math.inf, least_approach(scene, point.time, largest_force))
     return {
         "time_error": max(stepped / per_force, error.force / per_force, error.approach / per_approach),
         "stated_error": max(pressure, force / per_force, approach / per_approach),

@@ -1,8 +1,9 @@
 """First guess of the contact of a step: the best combination of pressures whose displacements are known.
 
-The contact solver minimises the energy ``compliance p.Kp/2 + gap.p`` over the pressures ``p >= 0`` of a step. The
-minimum over the combinations of a few pressures with known displacements ``Kp`` costs no convolution [1]_. The
-combination may be negative in some cells: the solver sets them to zero.
+The contact solver minimises the energy ``compliance p.Kp/2 + gap.p - approach sum(p)`` over the pressures ``p >= 0`` of
+a step; under a load without the last term. The minimum over the combinations of a few pressures with known
+displacements ``Kp`` costs no convolution [1]_. The combination may be negative in some cells: the solver sets them to
+zero.
 
 .. [1] P. F. Fischer, Projection techniques for iterative solution of Ax = b with successive right-hand sides, Computer
    Methods in Applied Mechanics and Engineering 163 (1998) 193.
@@ -16,15 +17,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from roughvisc.mechanics.contact.passes import inner
-from roughvisc.mechanics.scene import Packed, unpacked
+from roughvisc.mechanics.memory import Prediction
+from roughvisc.mechanics.scene import Packed, Point, unpacked
 
 Array = Any  # an array of NumPy or CuPy
 
-#: A direction whose energy is at most this part of the energy of the first pressure is due to rounding.
-ROUNDING = 1e-12
+#: A direction with at most this part of the largest energy is left out. Its displacement, less than 1e-6 of the others,
+#: is known to 1e-9 of itself at best. Equations with a smaller ratio of singular values count as dependent.
+NEGLIGIBLE = 1e-12
 
 
-class Known(NamedTuple):
+class Candidate(NamedTuple):
     """Pressure that a first guess may contain.
 
     Attributes
@@ -32,9 +35,9 @@ class Known(NamedTuple):
     stored_pressure : array, shape (nx, ny), or Packed
         Pressure. [Pa]
     displacement : array, shape (nx, ny)
-        Displacement per unit compliance, ``Kp``; not used if the kernel depends on the step. [m Pa]
+        Displacement per unit compliance, ``Kp``. If the kernel depends on the step, it is of no use. [m Pa]
     weight : float
-        Weight in the guess if displacements are not used.
+        Weight in the guess if displacements are of no use.
     """
 
     stored_pressure: Array | Packed
@@ -47,22 +50,92 @@ class Known(NamedTuple):
         return unpacked(self.stored_pressure)
 
 
-def combination(known: Sequence[Known], weights: Sequence[float], *, of_displacement: bool = False) -> Array:
+def last_two(here: Point, step: float) -> list[Candidate]:
+    """Return the pressures at the start of a step [s] and at the point before it; their weights extrapolate in time."""
+    displacement = here.history.fields[0]
+    if here.previous is None or step == 0:
+        return [Candidate(here.stored_pressure, displacement, 1.0)]
+    then, stored, former_displacement = here.previous
+    ratio = step / (here.time - then)
+    return [
+        Candidate(here.stored_pressure, displacement, 1 + ratio),
+        Candidate(stored, former_displacement, -ratio),
+    ]
+
+
+def both_ends(start: Point, end: Point, time: float) -> list[Candidate]:
+    """Return the pressures at both ends of a step, for a time inside it [s]; their weights interpolate."""
+    weight = (time - start.time) / (end.time - start.time)
+    return [
+        Candidate(end.stored_pressure, end.history.fields[0], weight),
+        Candidate(start.stored_pressure, start.history.fields[0], 1 - weight),
+    ]
+
+
+def around_coarse(end: Point, coarse: Point, fine: Point) -> list[Candidate]:
+    """Return the pressures for the coarse solution at the end of a step.
+
+    They are the fine solution at the end, and both solutions before it; their weights add the difference of these two.
+    In a slide the pressure stays with the profile, so that all are in its frame.
+    """
+    points = [(end, 1.0)]
+    if coarse is not fine:
+        points += [(coarse, 1.0), (fine, -1.0)]
+    return [Candidate(point.stored_pressure, point.history.fields[0], weight) for point, weight in points]
+
+
+def first_guess(
+    candidates: Sequence[Candidate], prediction: Prediction, gap: Array, **target: float
+) -> dict[str, Array]:
+    """Return the arguments of :func:`solve_contact` that state the first guess of a step; none from open surfaces.
+
+    Parameters
+    ----------
+    candidates : sequence of Candidate
+        Pressures that the guess combines.
+    prediction : Prediction
+        Elastic problem of the step.
+    gap : array, shape (nx, ny)
+        Gap without pressure in the step at zero approach; finite. [m]
+    **target
+        ``load``, the sum of the pressure over the cells [Pa], or ``approach`` [m].
+    """
+    candidates = [candidate for candidate in candidates if candidate.pressure.any()]
+    if not candidates:
+        return {}
+    alpha = prediction.compliance
+    has_displacements = prediction.grid is None
+    weights = [candidate.weight for candidate in candidates]
+    if has_displacements:
+        weights = best_weights(candidates, alpha, gap, **target)
+    weights = [alpha * weight for weight in weights]  # the solver takes pressures over the contact modulus, 1 / alpha
+    start = combination(candidates, weights)
+    if not has_displacements or start.min() < 0:  # the displacement would belong to the negative pressures too
+        return {"start": start}
+    return {"start": start, "start_displacement": combination(candidates, weights, of_displacement=True)}
+
+
+def combination(candidates: Sequence[Candidate], weights: Sequence[float], *, of_displacement: bool = False) -> Array:
     """Return the combination of the pressures [Pa], or of the displacements [m Pa], with weights."""
     total: Array = 0.0
-    for one, weight in zip(known, weights, strict=True):
-        total = total + weight * (one.displacement if of_displacement else one.pressure)
+    for candidate, weight in zip(candidates, weights, strict=True):
+        total = total + weight * (candidate.displacement if of_displacement else candidate.pressure)
     return total
 
 
 def best_weights(
-    known: Sequence[Known], compliance: float, gap: Array, *, load: float | None = None, approach: float | None = None
+    candidates: Sequence[Candidate],
+    compliance: float,
+    gap: Array,
+    *,
+    load: float | None = None,
+    approach: float | None = None,
 ) -> list[float]:
     """Return the weights of the combination that has the least energy, and the load if one is given.
 
     Parameters
     ----------
-    known : sequence of Known
+    candidates : sequence of Candidate
         Pressures with their displacements; the first pressure must not vanish.
     compliance : float
         Compliance of the step. [1/Pa]
@@ -71,25 +144,27 @@ def best_weights(
     load, approach : float
         Sum of the pressure over the cells [Pa], or approach [m]; exactly one.
     """
-    sums, slopes = np.zeros((2, len(known)))
-    energies = np.zeros((len(known), len(known)))
-    for row, one in enumerate(known):
-        pressure = one.pressure
+    count = len(candidates)
+    sums = np.zeros(count)
+    descents = np.zeros(count)  # decrease of the energy with each weight, from zero pressure
+    energies = np.zeros((count, count))
+    for row, candidate in enumerate(candidates):
+        pressure = candidate.pressure
         sums[row] = float(pressure.sum())
-        slopes[row] = (approach or 0.0) * sums[row] - inner(pressure, gap)
-        energies[row] = [inner(pressure, other.displacement) for other in known]
-    energies = compliance * (energies + energies.T) / 2
+        descents[row] = (approach or 0.0) * sums[row] - inner(pressure, gap)
+        pressure = compliance * pressure  # otherwise products with pressures of 1e200 Pa overflow
+        energies[row] = [inner(pressure, other.displacement) for other in candidates]
+    energies = (energies + energies.T) / 2
     # The first pressure, which carries the load, and directions that do not change the load.
-    directions = np.eye(len(known))
+    directions = np.eye(count)
     directions[0, 1:] = -sums[1:] / sums[0]
-    begin = np.zeros(len(known))
+    begin = np.zeros(count)
     if load is not None:
         begin[0] = load / sums[0]
         directions = directions[:, 1:]
-    sizes = np.sqrt(np.maximum(np.einsum("ij,ik,kj->j", directions, energies, directions), 0.0))
-    counts = sizes**2 > ROUNDING * energies[0, 0]
-    directions = directions[:, counts] / sizes[counts]
-    parts = np.linalg.lstsq(
-        directions.T @ energies @ directions, directions.T @ (slopes - energies @ begin), rcond=ROUNDING
-    )[0]
+    squares = np.einsum("ij,ik,kj->j", directions, energies, directions)
+    is_used = squares > NEGLIGIBLE * abs(energies).max()
+    directions = directions[:, is_used] / np.sqrt(squares[is_used])
+    matrix = directions.T @ energies @ directions
+    parts = np.linalg.lstsq(matrix, directions.T @ (descents - energies @ begin), rcond=NEGLIGIBLE)[0]
     return [float(weight) for weight in begin + directions @ parts]

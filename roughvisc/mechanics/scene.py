@@ -203,7 +203,7 @@ class Point:
     history : History
         Memory of the body.
     previous : tuple or None
-        Time, stored pressure, and displacement per unit compliance of the last point: the next step extrapolates them.
+        Time, stored pressure, and displacement per unit compliance of the last point, for the next first guess.
     start : float
         Force [N] or approach [m] at the start of the segment, if the program does not state it.
     is_late : bool

@@ -31,9 +31,10 @@ RESOLVED = 1.5
 ALLOWED = 0.25
 ALLOWED_SOFT = 0.17
 #: While the approach is held, the force relaxes as errors do, so that the errors of all pairs add up. All pairs until
-#: the next kept time may add this part of the tolerance, each in proportion to the logarithm of the relaxation; and a
-#: pair at least this part of what it may add elsewhere. Rows beyond the tolerance without both: XX of 2,000, with 0.1
-#: and 0.5: XX and XX for XX and XX of the convolutions (`closed_forms.py cells-one --scenes 1000 --seed 777002`).
+#: the next kept time may add this many times the tolerance, each its share in the logarithm of the relaxation; and a
+#: pair at least this part of what it may add elsewhere. What is added is the difference of both solutions, three times
+#: the error. Rows beyond the tolerance: 24 of 2,000. Without ALLOWED_IN_HOLD 78, for 0.80 of the convolutions;
+#: LEAST_SHARE = 0.1 14, for 1.31; 0.5 36, for 0.90 (`closed_forms.py cells-one --scenes 1000 --seed 777003`).
 ALLOWED_IN_HOLD = 2.0
 LEAST_SHARE = 0.3
 #: Order of the error of a pair in its length, observed: cells enter and leave the contact within steps. With 2: 1.00,
@@ -238,10 +239,10 @@ def errors_over_allowed(
 ) -> tuple[float, float]:
     """Return the error that a pair adds at the next kept time, over the allowed error, and its error at a kept row.
 
-    If the pair has a kept row, the first one is that at its end. The second one is relative to the tolerance, and zero
-    if the pair may not be repeated for it. Errors are relative to the largest force and approach of the kept rows, of
-    the pair, and of the next row as far as it is known. An approach counts as at least its rounding error: a flat
-    periodic surface has no larger approach.
+    If the pair has a kept row, its end counts as the next kept time. The error at a kept row is relative to the
+    tolerance, and zero if the pair may not be repeated for it. Errors are relative to the largest force and approach of
+    the kept rows, of the pair, and of the next row as far as it is known. While the approach is held, they are relative
+    to the largest force of the kept rows and the force that relaxation leaves until the next one.
 
     Parameters
     ----------
@@ -262,12 +263,9 @@ def errors_over_allowed(
     """
     second = pair.second
     taken = pair.length
-    memory = scene.memory
     force = max(of_rows.force, pair.first.size, second.size, scene.least_force)
-    rounding = ROUNDING * memory.compliance(second.time) * scene.grid.largest_eigenvalue * force / scene.gap.size
-    approach = max(
-        of_rows.approach, abs(pair.first.approach), abs(second.approach), rounding / scene.grid.cell_area, 1e-300
-    )
+    least = least_approach(scene, second.time, force)
+    approach = max(of_rows.approach, abs(pair.first.approach), abs(second.approach), least)
 
     row = 0.0
     factor, factor_of_approach = stated_over_difference(scene)
@@ -288,6 +286,22 @@ def errors_over_allowed(
         scales = max(of_rows.force, second.size * left, scene.least_force), scales[1]
         allowed = min(allowed, max(ALLOWED_IN_HOLD * share, LEAST_SHARE * allowed))
     return added_error(scene, pair, number, following, scales) / (allowed * scene.tolerance), row
+
+
+def least_approach(scene: Scene, time: float, force: float) -> float:
+    """Return the smallest approach that errors are relative to: its rounding error. [m]
+
+    A flat periodic surface has no larger approach.
+
+    Parameters
+    ----------
+    scene : Scene
+        Input of the time stepping.
+    time, force : float
+        Time [s], and largest force until then. [N]
+    """
+    rounding = ROUNDING * scene.memory.compliance(time) * scene.grid.largest_eigenvalue
+    return max(rounding * force / (scene.gap.size * scene.grid.cell_area), 1e-300)
 
 
 def force_ahead(scene: Scene, pair: Pair, following: float, of_rows: Scales) -> float:
@@ -336,21 +350,23 @@ def force_ahead(scene: Scene, pair: Pair, following: float, of_rows: Scales) -> 
 
 
 def relaxed_in_hold(scene: Scene, pair: Pair, number: int, following: float) -> tuple[float, float]:
-    """Return the part of the force that relaxation leaves until the next kept time, and the share of a pair in it.
+    """Return the part of the force that is left at the next kept time, and the share of a pair in the relaxation.
 
-    The share is in proportion to the logarithm of the relaxation. Both are one unless the approach is held until then.
-    The parameters are those of :func:`added_error`.
+    The share is that of logarithms, in the relaxation from the last kept time to the next one. Both results are one if
+    the approach is not held until then, if the surfaces are open, or if no relaxation function is known. The parameters
+    are those of :func:`added_error`.
     """
     segment = scene.program.segments[number]
     began, end = scene.program.corners[number : number + 2]
     is_held = segment.control == "approach" and segment.holds
-    if not is_held or following > end or pair.second.is_open:
+    if not is_held or following > end or pair.second.is_open or scene.kept is None:
         return 1.0, 1.0
     relaxation = scene.memory.relaxation
     times = max(scene.last_kept(pair.start.time), began), pair.start.time, pair.second.time, following
-    last, before, after, then = (max(relaxation(time - began), 1e-300) for time in times)
-    whole = math.log(last / then)
-    return (max(then / after, LEAST_REMAINING), math.log(before / after) / whole) if whole > 0 else (1.0, 1.0)
+    last, before, after, then = (max(relaxation(time - began), ROUNDED) for time in times)
+    if then >= last * (1 - ROUNDED):
+        return 1.0, 1.0
+    return max(then / after, LEAST_REMAINING), math.log(before / after) / math.log(last / then)
 
 
 def rise_until(scene: Scene, number: int, point: Point, following: float) -> float:

@@ -26,8 +26,8 @@ from roughvisc.errors import ConvergenceError, InputError
 from roughvisc.mechanics.adhesive_step import GROWTH, JUMP, dissipated, longest_step, step_with_adhesion
 from roughvisc.mechanics.contact.adhesive import Unstable
 from roughvisc.mechanics.contact.solver import solve_contact
-from roughvisc.mechanics.first_guess import Known, best_weights, combination
-from roughvisc.mechanics.memory import LARGEST_GROWTH, STIFF, Prediction, Rule
+from roughvisc.mechanics.first_guess import Candidate, around_coarse, both_ends, combination, first_guess, last_two
+from roughvisc.mechanics.memory import LARGEST_GROWTH, STIFF, Rule
 from roughvisc.mechanics.program import Segment, Slide, instant
 from roughvisc.mechanics.scene import SOFT, Array, Packed, Point, Scene
 from roughvisc.mechanics.stated_error import (
@@ -289,7 +289,7 @@ def next_segment(scene: Scene, state: State) -> State:
 
 
 def without_past(point: Point) -> Point:
-    """Return a point without its past: the next step neither extrapolates nor uses the step before."""
+    """Return a point without its past: the next step does not use the step before."""
     return replace(point, previous=None, history=replace(point.history, earlier=None, step=0.0))
 
 
@@ -301,7 +301,7 @@ def single_step(scene: Scene, state: State, time: float, *, may_refuse: bool = F
     new = other = take_step(scene, fine, time, number, rule="linear", may_refuse=may_refuse)
     if coarse is not fine:
         rule: Rule | None = "linear" if coarse.is_open else None
-        other = take_step(scene, coarse, time, number, known=with_difference(new, coarse, fine), rule=rule)
+        other = take_step(scene, coarse, time, number, candidates=around_coarse(new, coarse, fine), rule=rule)
     error = difference(scene, fine, new, other, scene.motions[number], is_kept=scene.keeps(time))
     left = scene.memory.remaining(time - fine.time)
     lasting = error.at_least(state.errors, left)
@@ -450,7 +450,7 @@ def solve_pair(scene: Scene, state: State, middle: float, last: float, *, has_ro
     first = take_step(scene, start, middle, number, solver_part=solver_part)
     second = take_step(scene, first, last, number, solver_part=solver_part)
     coarse_end = take_step(
-        scene, coarse, last, number, known=with_difference(second, coarse, start), solver_part=solver_part
+        scene, coarse, last, number, candidates=around_coarse(second, coarse, start), solver_part=solver_part
     )
     pair = Pair(start, coarse, first, second, coarse_end, is_soft)
     if not needs_pressure:
@@ -566,13 +566,8 @@ def row_at_middle(scene: Scene, pair: Pair, number: int) -> Point:
 def row_inside(scene: Scene, pair: Pair, time: float, number: int) -> Point:
     """Return the solution at a kept time inside a pair [s], one step from the point of the fine solution before it."""
     start, end = (pair.start, pair.first) if time < pair.first.time else (pair.first, pair.second)
-    weight = (time - start.time) / (end.time - start.time)
-    known = (
-        Known(end.stored_pressure, end.history.fields[0], weight),
-        Known(start.stored_pressure, start.history.fields[0], 1 - weight),
-    )
     solver_part = END_STEP if pair.is_soft else SOLVER_PART
-    row = take_step(scene, start, time, number, known=known, solver_part=solver_part)
+    row = take_step(scene, start, time, number, candidates=both_ends(start, end, time), solver_part=solver_part)
     return with_final_pressure(scene, start, row, number) if pair.is_soft else row
 
 
@@ -625,7 +620,7 @@ def after_steps(
     reached = replace(
         state,
         fine=fine,
-        coarse=None if coarse is fine else replace(coarse, previous=None),  # the coarse solution does not extrapolate
+        coarse=None if coarse is fine else replace(coarse, previous=None),  # the coarse solution starts from others
         next_length=next_length,
         largest_force=max(state.largest_force, points[0].size, fine.size),
         largest_approach=max(state.largest_approach, abs(points[0].approach), abs(fine.approach)),
@@ -664,19 +659,20 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
         history = memory.roll(here.history, slide.sense * number, slide.axis)
         return replace(here, history=history, stored_pressure=moved(here.pressure, number), previous=None)
 
-    def over(here: Point, number: int, time: float, known: Sequence[Known]) -> Point:
-        return take_step(scene, body_under(here, number), time, state.segment, known=known, solver_part=SLIDING_PART)
+    def over(here: Point, number: int, time: float, candidates: Sequence[Candidate]) -> Point:
+        body = body_under(here, number)
+        return take_step(scene, body, time, state.segment, candidates=candidates, solver_part=SLIDING_PART)
 
     points = [fine]
     works = [0.0]
     for number in range(1, count + 1):
         here = points[-1]
         time = instant(began, end, taken + number, cells)
-        points.append(over(here, 1, time, [Known(here.stored_pressure, here.history.fields[0], 1.0)]))
+        points.append(over(here, 1, time, [Candidate(here.stored_pressure, here.history.fields[0], 1.0)]))
         works.append(works[-1] + work_of_step(scene, here, points[-1], slides=True))
     coarse_end = last = points[-1]
     if coarse is not fine or count == 2:
-        coarse_end = over(coarse, count, last.time, with_difference(last, coarse, fine))
+        coarse_end = over(coarse, count, last.time, around_coarse(last, coarse, fine))
 
     is_kept = any(scene.keeps(point.time) for point in points[1:])
     error = difference(scene, fine, last, coarse_end, slide, is_kept=is_kept)
@@ -723,7 +719,7 @@ def take_step(
     time: float,
     number: int,
     value: float | None = None,
-    known: Sequence[Known] | None = None,
+    candidates: Sequence[Candidate] | None = None,
     rule: Rule | None = None,
     solver_part: float = SOLVER_PART,
     *,
@@ -743,7 +739,7 @@ def take_step(
         Index of the segment.
     value : float, optional
         Load or approach at the end. Default: the prescribed value of the segment. [N or m]
-    known : sequence of Known, optional
+    candidates : sequence of Candidate, optional
         Pressures that the first guess combines. Default: those of this point and of the one before it.
     rule : {"linear", "bdf2", "constant"}, optional
         Rule of the memory.
@@ -767,8 +763,8 @@ def take_step(
     value = scene.program.prescribed(number, time, here.start) if value is None else value
     prediction = memory.predict(here.history, step, "constant" if here.is_late else rule)
     alpha = prediction.compliance
-    gap = prediction.carried
     grid = prediction.grid or scene.grid
+    gap = prediction.carried  # overwritten: no later part of the step needs it
     gap += scene.gap
     lowest = float(gap[scene.solid].min())
     unit_before = here.history.fields[0] if prediction.grid is None else None  # displacement per unit compliance
@@ -777,8 +773,7 @@ def take_step(
         nothing = grid.xp.zeros(gap.shape)
         history = memory.advance(here.history, prediction, nothing, nothing)
         return Point(time, nothing, 0.0, lowest if by_load else value, history, previous, here.start)
-    if known is None:
-        known = extrapolated(here, step)
+    candidates = last_two(here, step) if candidates is None else candidates
     tolerance = max(solver_part * scene.tolerance, 1e-10)
     if scene.adhesion is not None:
         return step_with_adhesion(
@@ -788,18 +783,20 @@ def take_step(
             value,
             prediction,
             gap,
-            combination(known, [one.weight for one in known]),
+            combination(candidates, [candidate.weight for candidate in candidates]),
             previous,
             tolerance,
             by_load=by_load,
             may_refuse=may_refuse,
         )
-    # the solver takes pressures over the contact modulus, which is 1 / alpha here
-    given: dict[str, Any] = {"load": value * alpha / area} if by_load else {"approach": value}
-    start = first_guess(known, prediction, gap, **{"load": value / area} if by_load else given)
-    del known
+    target: dict[str, Any] = {"load": value / area} if by_load else {"approach": value}
+    guess = first_guess(candidates, prediction, gap, **target)
+    if by_load:  # the solver takes pressures over the contact modulus, which is 1 / alpha here
+        target["load"] *= alpha
     try:
-        contact = solve_contact(grid, gap, tolerance=tolerance, **start, **given, overwrite=True, present=scene.present)
+        contact = solve_contact(
+            grid, gap, tolerance=tolerance, **guess, **target, overwrite=True, present=scene.present
+        )
     except ConvergenceError as error:
         raise ConvergenceError(
             f"at {time:.6g} s {error}; try a looser tolerance, a coarser grid, or layers whose moduli differ less"
@@ -827,56 +824,6 @@ def take_step(
         solver_error=contact.error,
         solver_error_approach=contact.approach_error,
     )
-
-
-def first_guess(known: Sequence[Known], prediction: Prediction, gap: Array, **given: float) -> dict[str, Any]:
-    """Return the arguments of :func:`solve_contact` that state the first guess of a step; none from open surfaces.
-
-    Parameters
-    ----------
-    known : sequence of Known
-        Pressures that the guess combines.
-    prediction : Prediction
-        Elastic problem of the step.
-    gap : array, shape (nx, ny)
-        Gap without pressure in the step at zero approach. [m]
-    **given
-        Sum of the pressure over the cells [Pa], or approach [m].
-    """
-    known = [one for one in known if one.pressure.any()]
-    if not known:
-        return {}
-    alpha = prediction.compliance
-    is_known = prediction.grid is None
-    weights = best_weights(known, alpha, gap, **given) if is_known else [one.weight for one in known]
-    weights = [alpha * weight for weight in weights]
-    start = combination(known, weights)
-    if not is_known or start.min() < 0:  # the displacement would belong to the negative pressures too
-        return {"start": start}
-    return {"start": start, "start_displacement": combination(known, weights, of_displacement=True)}
-
-
-def extrapolated(here: Point, step: float) -> list[Known]:
-    """Return the pressures of a point and of the one before it, for a step [s] that extrapolates them."""
-    if here.previous is None or step == 0:
-        return [Known(here.stored_pressure, here.history.fields[0], 1.0)]
-    then, stored, displacement = here.previous
-    ratio = step / (here.time - then)
-    return [
-        Known(here.stored_pressure, here.history.fields[0], 1 + ratio),
-        Known(stored, displacement, -ratio),
-    ]
-
-
-def with_difference(second: Point, coarse: Point, fine: Point) -> list[Known]:
-    """Return the pressures that a first guess of the coarse solution combines.
-
-    They are the fine solution at the end of the step, and the difference between both solutions before the step.
-    """
-    points = [(second, 1.0)]
-    if coarse is not fine:
-        points += [(coarse, 1.0), (fine, -1.0)]
-    return [Known(point.stored_pressure, point.history.fields[0], weight) for point, weight in points]
 
 
 def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> float:

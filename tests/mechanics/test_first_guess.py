@@ -8,12 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support import rough_gap
 
-from roughvisc.mechanics.first_guess import Known, best_weights, combination
+import roughvisc as rv
+from roughvisc.mechanics.first_guess import Candidate, best_weights, combination
 from roughvisc.mechanics.grid import Grid
 
 
-def known(grid, *pressures):
-    return [Known(pressure, grid.displacement(pressure), math.nan) for pressure in pressures]
+def candidates(grid, *pressures):
+    return [Candidate(pressure, grid.displacement(pressure), math.nan) for pressure in pressures]
 
 
 def energy_of(grid, pressure, compliance, gap, load=None, approach=0.0):
@@ -29,7 +30,7 @@ def test_full_contact_of_a_wave__is_solved_exactly(shape):
     of_wave = float((grid.displacement(wave) / wave)[0, 0])
     compliance, depth, mean = 0.7, 0.2, 3.0
     exact = mean + depth / (compliance * of_wave) * wave
-    fields = known(grid, np.ones(shape) + 0.1 * wave, np.full(shape, 2.0) - 0.3 * wave)
+    fields = candidates(grid, np.ones(shape) + 0.1 * wave, np.full(shape, 2.0) - 0.3 * wave)
     weights = best_weights(fields, compliance, -depth * wave, load=mean * wave.size)
     np.testing.assert_allclose(combination(fields, weights), exact, rtol=1e-10)
     displaced = combination(fields, weights, of_displacement=True)
@@ -46,7 +47,7 @@ def test_full_contact_of_a_wave__is_solved_exactly(shape):
 def test_energy__is_the_least_of_all_combinations(seed, count, boundary, is_load, scale):
     rng = np.random.default_rng(seed)
     grid = Grid((9, 12), (1.0, 0.8), boundary)
-    fields = known(grid, *rng.random((count, *grid.shape)))
+    fields = candidates(grid, *rng.random((count, *grid.shape)))
     compliance = 10.0**scale
     gap = compliance * rough_gap(grid.shape, seed)
     control = {"load": 2.0} if is_load else {"approach": 0.3 * float(gap.max())}
@@ -70,7 +71,7 @@ def test_nearly_equal_pressures__never_make_the_guess_worse():
     for seed in range(100):
         rng = np.random.default_rng(seed)
         pressure, change = rng.random((2, *grid.shape))
-        fields = known(grid, pressure, pressure + 10.0 ** -rng.uniform(5, 12) * change)
+        fields = candidates(grid, pressure, pressure + 10.0 ** -rng.uniform(5, 12) * change)
         gap = 0.01 * rough_gap(grid.shape, seed)
         for control in ({"load": 2.0}, {"approach": 0.5}):
             alone, both = (
@@ -78,3 +79,14 @@ def test_nearly_equal_pressures__never_make_the_guess_worse():
                 for some in (fields[:1], fields)
             )
             assert both <= alone + 1e-9 * abs(alone)
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "mirror"])
+@pytest.mark.parametrize("shape", [(7, 9), (12, 10), (15, 11), (21, 16)])
+def test_flat_surface__is_pressed(shape, boundary):
+    """A uniform pressure displaces such a body by rounding only."""
+    flat = rv.from_array(np.zeros(shape), 1e-4)
+    press = rv.Program().pressure(1e4, over=0.1).hold(2)
+    ds = rv.simulate(flat, rv.zener(1e6, 1e6, 1.0), press, times=[0.1, 1.0, 2.1], boundary=boundary, progress=False)
+    np.testing.assert_allclose(ds.force, 1e4 * np.prod(shape) * 1e-8, rtol=1e-9)
+    assert (ds.stated_error < 1e-2).all()

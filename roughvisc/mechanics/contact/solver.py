@@ -166,7 +166,7 @@ def solve_contact(
     pressure, separation = problem.first_guess(start, start_displacement)
 
     under_load = problem.under_load
-    is_extrapolated = start_displacement is not None
+    is_given = start_displacement is not None
     has_blocks = min(gap.shape) >= BLOCKS_FROM  # the preconditioner may have a second level
     on_grid = passes.Scatter(grid.xp.zeros(gap.shape))
     cells = grid.xp.flatnonzero(pressure)
@@ -190,9 +190,9 @@ def solve_contact(
         touching = free.touching
         duality = duality_gap(free, under_load)
         rounding = duality_rounding(grid, free)
-        if free.size == 0 and is_extrapolated:  # a single cell: no step would correct the given displacement
+        if free.size == 0 and is_given:  # a single cell: no step would correct the given displacement
             separation = problem.separation_under(pressure)
-            is_extrapolated = False
+            is_given = False
             continue
 
         # The error estimate is the last requested change of pressure, scaled by the decrease of the duality gap since.
@@ -219,10 +219,10 @@ def solve_contact(
         previous = response = None  # frees the last response before the next one is computed
         requested_size *= CAUTION if waves is None else CAUTION_WITH_BLOCKS
         requested_duality = max(duality, 1e-300)
-        # The change requested now is a sharper estimate, before another convolution. The displacement of a first guess
-        # is not accurate enough for the end.
+        # The preconditioned residual estimates the error now, without another convolution. Not before the first step:
+        # the displacement of a first guess is not accurate enough.
         estimate = requested_size / max(free.total, 1e-300)
-        if iteration and is_solved(free, estimate, tolerance, duality, rounding):
+        if not is_given and is_solved(free, estimate, tolerance, duality, rounding):
             estimate += load_error(problem, pressure, separation, free)
             if estimate <= tolerance:
                 error = estimate
@@ -249,7 +249,7 @@ def solve_contact(
             break
 
         # Minimize the energy along the search direction, equation (11): one convolution.
-        if is_extrapolated:  # replaces the displacement of the first guess, so that rounding errors do not accumulate
+        if is_given:  # replaces the displacement of the first guess, so that rounding errors do not accumulate
             response = grid.displacement(on_grid(trial, cells)).reshape(-1)
             response -= separation
             response += problem.gap
@@ -257,9 +257,9 @@ def solve_contact(
             response = grid.displacement(on_grid(change, cells)).reshape(-1)
         curvature, minimum, fraction = passes.line_search(free.held, trial, change, slope, response, cells)
         longest = GROW_AFTER_CUT if fraction < minimum else GROW
-        if is_extrapolated:  # take the whole step: the displacement is known exactly only for its end
+        if is_given:  # take the whole step: the displacement is known exactly only for its end
             fraction = 1.0
-            is_extrapolated = False
+            is_given = False
             curvature = curvature if abs(minimum - 1) < NEARLY_MINIMUM else 0.0
         passes.advance(pressure, separation, cells, (free.held, trial, change), response, fraction)
         previous = (cells, change, response, curvature) if curvature > 0 else None
