@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import matplotlib as mpl
 import numpy as np
-from matplotlib.colors import Normalize
+from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 
 from roughvisc.errors import InputError
@@ -18,9 +19,9 @@ _QUANTITIES = {
     "relaxation": ("Relaxation modulus", "o"),
     "creep": ("Creep compliance", "o"),
 }
-#: Number of points of the line of the material, and colours of the temperatures, cold to warm.
+#: Number of points of the line of the material, and colours of the temperatures, cold to warm, without pale ones.
 _POINTS = 200
-_COLOURS = "plasma"
+_COLOURS = ListedColormap(mpl.colormaps["plasma"](np.linspace(0.0, 0.85, 256)))
 
 
 @style.apply

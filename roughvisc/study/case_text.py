@@ -66,10 +66,13 @@ def names_of(keys: Sequence[str]) -> dict[str, str]:
     'Kelvin viscosity'
     >>> names_of(["program.0.load", "program.2.load"])["program.2.load"]
     'Load (program.2)'
+    >>> names_of(["program.2.over"])["program.2.over"]
+    'Duration'
     """
     last = {}
     for key in keys:
         above, _, word = key.rpartition(".")
+        word = "duration" if word == "over" else word
         last[key] = f"{above.rpartition('.')[2]} {word}".strip() if word.isdecimal() else word
     counts = Counter(last.values())
     names = {key: f"{name} ({key.rpartition('.')[0]})" if counts[name] > 1 else name for key, name in last.items()}
