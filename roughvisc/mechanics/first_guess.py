@@ -11,10 +11,9 @@ zero.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from roughvisc.mechanics.contact.passes import inner
 from roughvisc.mechanics.memory import Prediction
@@ -22,8 +21,8 @@ from roughvisc.mechanics.scene import Packed, Point, unpacked
 
 Array = Any  # an array of NumPy or CuPy
 
-#: A direction with at most this part of the largest energy is left out. Its displacement, less than 1e-6 of the others,
-#: is known to 1e-9 of itself at best. Equations with a smaller ratio of singular values count as dependent.
+#: A direction with at most this part of the energy of the first pressure, or of its own before it was made orthogonal
+#: to the others, is left out. Its displacement, less than 1e-6 of theirs, is known to 1e-9 of itself at best.
 NEGLIGIBLE = 1e-12
 
 
@@ -144,27 +143,49 @@ def best_weights(
     load, approach : float
         Sum of the pressure over the cells [Pa], or approach [m]; exactly one.
     """
-    count = len(candidates)
-    sums = np.zeros(count)
-    descents = np.zeros(count)  # decrease of the energy with each weight, from zero pressure
-    energies = np.zeros((count, count))
+    sums = list[float]()
+    descents = list[float]()  # decrease of the energy with each weight, from zero pressure
+    energies = list[list[float]]()
     for row, candidate in enumerate(candidates):
         pressure = candidate.pressure
-        sums[row] = float(pressure.sum())
-        descents[row] = (approach or 0.0) * sums[row] - inner(pressure, gap)
+        sums.append(float(pressure.sum()))
+        descents.append((approach or 0.0) * sums[-1] - inner(pressure, gap))
         pressure = compliance * pressure  # otherwise products with pressures of 1e200 Pa overflow
-        energies[row] = [inner(pressure, other.displacement) for other in candidates]
-    energies = (energies + energies.T) / 2
-    # The first pressure, which carries the load, and directions that do not change the load.
-    directions = np.eye(count)
-    directions[0, 1:] = -sums[1:] / sums[0]
-    begin = np.zeros(count)
-    if load is not None:
-        begin[0] = load / sums[0]
-        directions = directions[:, 1:]
-    squares = np.einsum("ij,ik,kj->j", directions, energies, directions)
-    is_used = squares > NEGLIGIBLE * abs(energies).max()
-    directions = directions[:, is_used] / np.sqrt(squares[is_used])
-    matrix = directions.T @ energies @ directions
-    parts = np.linalg.lstsq(matrix, directions.T @ (descents - energies @ begin), rcond=NEGLIGIBLE)[0]
-    return [float(weight) for weight in begin + directions @ parts]
+        energies.append([inner(pressure, other.displacement) for other in candidates[: row + 1]])
+    for row, line in enumerate(energies):
+        line += [energies[other][row] for other in range(row + 1, len(candidates))]
+    # The first pressure carries the load; the others, less their part of it, do not change the load.
+    weights = [0.0] * len(candidates)
+    directions = list[list[float]]()
+    for number in range(len(candidates)):
+        direction = [float(number == other) for other in range(len(candidates))]
+        direction[0] -= sums[number] / sums[0] if number else 0.0
+        if number == 0 and load is not None:
+            weights[0] = load / sums[0]
+            continue
+        # Directions of unit energy that are orthogonal to each other: the minimum along each one is independent.
+        whole = bilinear(energies, direction, direction)
+        for former in directions:
+            part = bilinear(energies, former, direction)
+            direction = [own - part * other for own, other in zip(direction, former, strict=True)]
+        energy = bilinear(energies, direction, direction)
+        if energy <= NEGLIGIBLE * max(whole, energies[0][0]):
+            continue
+        directions.append([value / math.sqrt(energy) for value in direction])
+    slopes = [
+        descent - sum(energy * weight for energy, weight in zip(line, weights, strict=True))
+        for descent, line in zip(descents, energies, strict=True)
+    ]
+    for direction in directions:
+        part = sum(slope * value for slope, value in zip(slopes, direction, strict=True))
+        weights = [weight + part * value for weight, value in zip(weights, direction, strict=True)]
+    return weights
+
+
+def bilinear(matrix: Sequence[Sequence[float]], left: Sequence[float], right: Sequence[float]) -> float:
+    """Return ``left . matrix right``."""
+    return sum(
+        one * value * other
+        for one, line in zip(left, matrix, strict=True)
+        for value, other in zip(line, right, strict=True)
+    )

@@ -256,8 +256,8 @@ class Memory:
 
     def remaining(self, time: float) -> float:
         """Return the part of an error of the history that relaxation leaves after a time. [s]"""
-        left = (self.parts * np.exp(-self.rates * time)).sum() / self.parts.sum()
-        return float(np.clip(left, 0.0, 1.0))
+        left = float((self.parts * np.exp(-self.rates * time)).sum() / self.parts.sum())
+        return min(max(left, 0.0), 1.0)
 
     def grown_after(self, factor: float, longest: float) -> float:
         """Return the time after which the compliance has grown by a factor, at most the longest time. [s]"""
