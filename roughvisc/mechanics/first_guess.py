@@ -15,6 +15,8 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from roughvisc.mechanics.contact.passes import inner
 from roughvisc.mechanics.memory import Prediction
 from roughvisc.mechanics.scene import Packed, Point, unpacked
@@ -143,49 +145,34 @@ def best_weights(
     load, approach : float
         Sum of the pressure over the cells [Pa], or approach [m]; exactly one.
     """
-    sums = list[float]()
-    descents = list[float]()  # decrease of the energy with each weight, from zero pressure
-    energies = list[list[float]]()
+    count = len(candidates)
+    sums = np.zeros(count)
+    descents = np.zeros(count)  # decrease of the energy with each weight, from zero pressure
+    energies = np.zeros((count, count))
     for row, candidate in enumerate(candidates):
         pressure = candidate.pressure
-        sums.append(float(pressure.sum()))
-        descents.append((approach or 0.0) * sums[-1] - inner(pressure, gap))
+        sums[row] = float(pressure.sum())
+        descents[row] = (approach or 0.0) * sums[row] - inner(pressure, gap)
         pressure = compliance * pressure  # otherwise products with pressures of 1e200 Pa overflow
-        energies.append([inner(pressure, other.displacement) for other in candidates[: row + 1]])
-    for row, line in enumerate(energies):
-        line += [energies[other][row] for other in range(row + 1, len(candidates))]
+        for column, other in enumerate(candidates[: row + 1]):
+            energies[row, column] = energies[column, row] = inner(pressure, other.displacement)
     # The first pressure carries the load; the others, less their part of it, do not change the load.
-    weights = [0.0] * len(candidates)
-    directions = list[list[float]]()
-    for number in range(len(candidates)):
-        direction = [float(number == other) for other in range(len(candidates))]
-        direction[0] -= sums[number] / sums[0] if number else 0.0
-        if number == 0 and load is not None:
-            weights[0] = load / sums[0]
-            continue
-        # Directions of unit energy that are orthogonal to each other: the minimum along each one is independent.
-        whole = bilinear(energies, direction, direction)
+    weights = np.zeros(count)
+    axes = np.eye(count)
+    axes[1:, 0] = -sums[1:] / sums[0]
+    if load is not None:
+        weights[0] = load / sums[0]
+        axes = axes[1:]
+    # Along directions of unit energy that are orthogonal to each other, the minima are independent.
+    directions = list[np.ndarray]()
+    for axis in axes:
+        direction = axis
         for former in directions:
-            part = bilinear(energies, former, direction)
-            direction = [own - part * other for own, other in zip(direction, former, strict=True)]
-        energy = bilinear(energies, direction, direction)
-        if energy <= NEGLIGIBLE * max(whole, energies[0][0]):
-            continue
-        directions.append([value / math.sqrt(energy) for value in direction])
-    slopes = [
-        descent - sum(energy * weight for energy, weight in zip(line, weights, strict=True))
-        for descent, line in zip(descents, energies, strict=True)
-    ]
+            direction = direction - (former @ energies @ direction) * former
+        energy = float(direction @ energies @ direction)
+        if energy > NEGLIGIBLE * max(float(axis @ energies @ axis), energies[0, 0]):
+            directions.append(direction / math.sqrt(energy))
+    slopes = descents - energies @ weights
     for direction in directions:
-        part = sum(slope * value for slope, value in zip(slopes, direction, strict=True))
-        weights = [weight + part * value for weight, value in zip(weights, direction, strict=True)]
-    return weights
-
-
-def bilinear(matrix: Sequence[Sequence[float]], left: Sequence[float], right: Sequence[float]) -> float:
-    """Return ``left . matrix right``."""
-    return sum(
-        one * value * other
-        for one, line in zip(left, matrix, strict=True)
-        for value, other in zip(line, right, strict=True)
-    )
+        weights = weights + (slopes @ direction) * direction
+    return [float(weight) for weight in weights]
