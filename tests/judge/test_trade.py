@@ -210,3 +210,14 @@ def test_figure__draws_every_setting_and_the_front():
         rv.plot.trade(ds, "colour")
     with refused():
         rv.plot.trade(xr.Dataset())
+
+
+def test_labels_of_the_figure__do_not_overlap():
+    """Four runs as fast and as accurate as each other, to a few per cent, and one far away that sets the axes."""
+    near = [(10.0**-number, 1, 1.0 + 0.03 * number, 0.01 * (1 + 0.05 * number)) for number in range(1, 5)]
+    (ax,) = rv.plot.trade(made_up([*near, (1e-5, 2.0, 1e-3, 1.0)]), AREA).axes
+    ax.figure.draw_without_rendering()
+    boxes = [text.get_window_extent() for text in ax.texts]
+    assert len(boxes) == 5
+    for number, box in enumerate(boxes):
+        assert not box.count_overlaps(boxes[:number])
