@@ -502,13 +502,14 @@ def accepted(
             error = replace(error, friction=max(error.friction, unresolved))
         return error.at_least(former, left, of_friction, is_soft=pair.is_soft)
 
+    stated = with_former(error, pair.second)
+
     def with_late_entry(error: StepErrors, point: Point) -> StepErrors:
         if not pair.is_soft:
             return error
         uncertain = error_of_late_entry(scene, start, point, stated.gap, state.entered)
         return replace(error, shared=max(error.shared, uncertain))
 
-    stated = with_former(error, pair.second)
     entered = state.entered
     force = force_of_entered(scene, start, pair.second) if pair.is_soft else 0.0
     if force > 0:
