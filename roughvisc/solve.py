@@ -142,7 +142,7 @@ def solve(
     problem = experiment.resolved(problem)
     height = problem.height
     settings = problem.settings
-    # a curve of steady sliding does so itself
+    # steady sliding estimates the error of its grid itself
     loading = experiment if settings.grid_error and isinstance(experiment, Loading) else None
     compared = ("pressure", "gap") if attraction(settings) is not None else ("pressure",)
     needed = tuple(name for name in compared if loading and name not in settings.fields)

@@ -98,7 +98,7 @@ class StepErrors:
         former : StepErrors
             Errors before the pair.
         left : float
-            Part of an error of the pressure that relaxation leaves until the end of the pair.
+            Part of an error of the pressure that relaxation leaves until then.
         left_of_friction : float
             Part of the friction force that is left, see :func:`left_of_friction`.
         is_soft : bool
@@ -110,15 +110,24 @@ class StepErrors:
             pressure=max(self.pressure, lasting * former.pressure),
             force=max(self.force, lasting * former.force),
             approach=max(self.approach, LASTING * former.approach),
-            friction=max(self.friction, max(left, left_of_friction) * former.friction),  # may be all shared
+            friction=max(self.friction, max(left, left_of_friction) * former.friction),  # both solutions may share it
             shared=self.shared + left * former.shared,
             gap=max(self.gap, LASTING * former.gap),
         )
 
-    def or_larger(self, other: StepErrors, factor: float = 1.0) -> StepErrors:
-        """Return the larger error of each kind, of this one and the other one times a factor."""
-        larger = np.maximum(list(vars(self).values()), factor * np.array(list(vars(other).values())))
-        return StepErrors(*larger.tolist())
+    def or_larger(self, other: StepErrors, left: float = 1.0) -> StepErrors:
+        """Return the larger error of each kind, of this one and of what relaxation leaves of the other one.
+
+        Parameters
+        ----------
+        other : StepErrors
+            Other errors.
+        left : float
+            Part of them that relaxation leaves; errors of the approach and of the gap do not fade.
+        """
+        parts = {name: error * left for name, error in vars(other).items()}
+        parts |= {"approach": other.approach, "gap": other.gap}
+        return StepErrors(**{name: max(error, parts[name]) for name, error in vars(self).items()})
 
 
 def stated_over_difference(scene: Scene) -> tuple[float, float]:

@@ -101,14 +101,14 @@ class Pair:
         return bool((self.start.contact & ~self.second.contact).any())
 
 
-class Scales(NamedTuple):
-    """Forces and approaches until a pair, from which the scale of its errors follows.
+class Largest(NamedTuple):
+    """Largest forces and approaches until a pair, to which its errors are relative.
 
     Attributes
     ----------
     force, approach : float
         Largest values of the kept rows so far; a prescribed approach, which states no error, of all steps. [N, m]
-    largest : float
+    of_all : float
         Largest force of all steps. [N]
     peak : tuple of float
         Force, approach and time of the last step whose force exceeded what relaxation had left of the peak before it.
@@ -117,7 +117,7 @@ class Scales(NamedTuple):
 
     force: float
     approach: float
-    largest: float
+    of_all: float
     peak: tuple[float, float, float]
 
 
@@ -221,7 +221,8 @@ def pair_ends(scene: Scene, number: int, now: float, length: float, *, is_first:
     end = min(end, scene.next_kept(now)) if is_first else end
     pairs = max(math.ceil((end - now) / length - SLACK), 1)
     last = end if pairs == 1 else now + (end - now) / pairs
-    near = scene.kept_within(now + (1 - slack) * (last - now), min(now + (1 + slack) * (last - now), end))
+    latest = min(now + (1 + slack) * min(last - now, length), end)  # after a stiff pair the next one may not be longer
+    near = scene.kept_within(now + (1 - slack) * (last - now), latest)
     last = near[-1] if near else last
     middle = now + (last - now) / 2
     rounded = scene.kept_within(middle - ROUNDED * (last - now), middle + ROUNDED * (last - now))
@@ -234,7 +235,7 @@ def errors_over_allowed(
     number: int,
     error: StepErrors,
     shared: float,
-    of_rows: Scales,
+    largest: Largest,
     *,
     has_row: bool,
 ) -> tuple[float, float]:
@@ -254,19 +255,19 @@ def errors_over_allowed(
     number : int
         Index of the segment.
     error : StepErrors
-        Stated error at the end of the pair.
+        Error of the pair at its end, without the errors before it.
     shared : float
         Error of the pressure that both solutions share, what is left from before the pair included. [N]
-    of_rows : Scales
+    largest : Largest
         Forces and approaches until the pair.
     has_row : bool
         Whether the pair contains a kept row.
     """
     second = pair.second
     taken = pair.length
-    force = max(of_rows.force, pair.first.size, second.size, scene.least_force)
+    force = max(largest.force, pair.first.size, second.size, scene.least_force)
     least = least_approach(scene, second.time, force)
-    approach = max(of_rows.approach, abs(pair.first.approach), abs(second.approach), least)
+    approach = max(largest.approach, abs(pair.first.approach), abs(second.approach), least)
 
     row = 0.0
     factor, factor_of_approach = stated_over_difference(scene)
@@ -278,13 +279,13 @@ def errors_over_allowed(
 
     following = second.time if has_row else min(scene.next_kept(second.time), scene.program.duration)
     rise = rise_until(scene, number, second, following)
-    expected = 0.0 if has_row else force_ahead(scene, pair, following, of_rows)
+    expected = 0.0 if has_row else force_ahead(scene, pair, following, largest)
     # under a load the approach grows at least as the root of the load: a cone
     scales = max(force, second.size * rise, expected), max(approach, abs(second.approach) * rise**0.5)
     allowed = ALLOWED_SOFT if scene.is_soft else ALLOWED
     left, share = relaxed_in_hold(scene, pair, number, following)
     if share < 1:
-        scales = max(of_rows.force, second.size * left, scene.least_force), scales[1]
+        scales = max(largest.force, second.size * left, scene.least_force), scales[1]
         allowed = min(allowed, max(ALLOWED_IN_HOLD * share, LEAST_SHARE * allowed))
     return added_error(scene, pair, number, following, scales) / (allowed * scene.tolerance), row
 
@@ -305,7 +306,7 @@ def least_approach(scene: Scene, time: float, force: float) -> float:
     return max(rounding * force / (scene.gap.size * scene.grid.cell_area), 1e-300)
 
 
-def force_ahead(scene: Scene, pair: Pair, following: float, of_rows: Scales) -> float:
+def force_ahead(scene: Scene, pair: Pair, following: float, largest: Largest) -> float:
     """Return the force that divides the error at the next kept time, as far as the program tells; else zero. [N]
 
     - Under a load: the prescribed load.
@@ -324,7 +325,7 @@ def force_ahead(scene: Scene, pair: Pair, following: float, of_rows: Scales) -> 
         Both solutions.
     following : float
         Next kept time. [s]
-    of_rows : Scales
+    largest : Largest
         Forces and approaches until the pair.
     """
     point = pair.second
@@ -332,11 +333,11 @@ def force_ahead(scene: Scene, pair: Pair, following: float, of_rows: Scales) -> 
     if math.isnan(value) or scene.adhesion is not None:
         return 0.0
     if control == "load":
-        return value or of_rows.largest
+        return value or largest.of_all
     first_touch = float(scene.gap[scene.solid].min())
     if value <= first_touch:  # the undeformed surface is the highest
-        return of_rows.largest
-    force, approach, then = of_rows.peak
+        return largest.of_all
+    force, approach, then = largest.peak
     peak = force * scene.memory.remaining(point.time - then)
     if value <= point.approach:
         fallen = pair.start.size - point.size

@@ -55,8 +55,8 @@ from roughvisc.mechanics.step_control import (
     ROUNDED,
     SHORTEST_PAIR,
     Controller,
+    Largest,
     Pair,
-    Scales,
     errors_over_allowed,
     first_length,
     pair_ends,
@@ -156,7 +156,7 @@ class Step(NamedTuple):
         Index of the segment that the step belongs to.
     state : State
         State after the step, from which a march continues. In the middle of a pair it is the state before the pair,
-        with the work and the path of the step.
+        with the work and its errors, the path, and the largest kept values of the step.
     is_end : bool
         Whether a march may continue from the state; False in the middle of a pair.
     """
@@ -219,8 +219,9 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
             steps = [Step(later.fine, later.errors, number, later)]
         state = steps[-1].state
         jumps_next = number < state.segment < len(segments) and segments[state.segment].duration == 0
-        comes_again = jumps_next and (scene.can_jump or is_jump)
-        if comes_again or (is_jump and not (scene.can_jump or is_start)):
+        # A jump yields only the state after it, or without instantaneous compliance only the state before it.
+        follows_from_jump = jumps_next and (scene.can_jump or is_jump)
+        if follows_from_jump or (is_jump and not (scene.can_jump or is_start)):
             steps.pop()
         # no step changes kept_force and kept_approach: the state has the values before the steps
         steps = with_largest_kept(scene, state, steps)
@@ -403,7 +404,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         length = min(length, segment.period / PAIRS_OF_A_CYCLE)
     controller = Controller(shortest_length(scene, number), state.growth)
     by_load = segment.control == "load"
-    scales = Scales(
+    largest = Largest(
         state.kept_force,
         state.kept_approach if by_load else state.largest_approach,
         state.largest_force,
@@ -422,7 +423,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
             next_length = length
             break
         shared = error.shared + state.errors.shared * scene.memory.remaining(pair.length)
-        ratio, at_row = errors_over_allowed(scene, pair, number, error, shared, scales, has_row=bool(times))
+        ratio, at_row = errors_over_allowed(scene, pair, number, error, shared, largest, has_row=bool(times))
         loses_contact = not start.is_open and (pair.first.is_open or pair.second.is_open)
         opens = not by_load and loses_contact and pair.second.approach >= start.approach
         is_stiff = scene.memory.grows(GROW * pair.length, STIFF)
@@ -516,7 +517,8 @@ def accepted(
         earlier = entered[0] if abs(start.approach - entered[1]) <= stated.gap else 0.0
         entered = (earlier + force, pair.second.approach)
 
-    inside = [row_at_middle(scene, pair, number) if pair.first.time in times else pair.first]
+    is_row = scene.kept is None or pair.first.time in times
+    inside = [row_at_middle(scene, pair, number) if is_row else pair.first]
     for time in times:
         if time not in (pair.first.time, pair.second.time):
             inside.append(row_inside(scene, pair, time, number))
@@ -548,7 +550,7 @@ def accepted(
         # it; at the end of another pair only the shared part counts.
         uncertain = uncertain_force_of_entered(scene, start, point)
         uncertain = uncertain if pair.is_soft else max(uncertain, shared_error_of_entered(scene, start, point))
-        # the larger errors contain the former ones; `with_former` adds the shared one, replaced here, and friction
+        # the larger errors contain the former ones, but for friction and the shared error, which `with_former` adds
         between = with_former(replace(stated.or_larger(former, left), shared=uncertain), point)
         between = with_late_entry(between, point)
         curved = math.hypot(state.work_curved, first_error if point.time <= pair.first.time else last_error)

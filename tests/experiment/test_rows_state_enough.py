@@ -103,6 +103,7 @@ def test_row_at_which_both_solutions_meet():
     before, met = StepErrors(pressure=1.0, force=2.0, approach=3.0, friction=4.0), StepErrors()
     assert met.at_least(before, left=0.8) == StepErrors(pressure=0.4, force=0.8, approach=1.5, friction=3.2)
     assert before.at_least(met, left=1.0) == before
+    assert met.or_larger(before, left=0.8) == StepErrors(pressure=0.8, force=1.6, approach=3.0, friction=3.2)
     terms = (8.87705394e-06, 2.18983982e-07, 1.68871794e-06, 1.19421571e-07, 1.52556064e-07)
     times = (8.70851432e-07, 7.64903669e4, 14.7892091, 1420.80128, 4.92916079e-9)
     kept = np.geomspace(53.18e-4, 53.18, 20).tolist()

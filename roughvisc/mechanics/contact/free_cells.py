@@ -20,7 +20,7 @@ class Free(NamedTuple):
         Approach.
     touching : int
         Number of cells in contact.
-    size : float
+    largest_residual : float
         Largest absolute residual.
     total, highest_pressure : float
         Sum of the pressure, and its largest value.
@@ -37,7 +37,7 @@ class Free(NamedTuple):
     residual: Array
     level: float
     touching: int
-    size: float
+    largest_residual: float
     total: float
     highest_pressure: float
     least: float

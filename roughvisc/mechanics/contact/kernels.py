@@ -121,7 +121,7 @@ def preconditioned(grid: Grid, found: Free, waves: LongWaves | None, on_grid: Sc
         return passes.preconditioned(grid, found, None, on_grid)
     cells = found.cells
     count = found.cells.size
-    size = found.size
+    size = found.largest_residual
     direction = cupy.empty(count)
     shapes = (*grid.shape, *waves.blocks.shape)
     launch("rest", count, found.residual, waves.left, waves.free, cells, *shapes, direction)

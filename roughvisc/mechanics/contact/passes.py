@@ -92,8 +92,8 @@ def preconditioned(grid: Grid, found: Free, waves: LongWaves | None, on_grid: Sc
     rest = found.residual
     if waves is not None:
         rest = rest - (waves.left / xp.maximum(waves.free, 1))[waves.place]
-    solution = grid.inverse(on_grid(rest, found.cells, found.size))
-    direction = xp.multiply(solution.reshape(-1).take(found.cells), found.size, dtype=float)
+    solution = grid.inverse(on_grid(rest, found.cells, found.largest_residual))
+    direction = xp.multiply(solution.reshape(-1).take(found.cells), found.largest_residual, dtype=float)
     if waves is not None:
         total = xp.bincount(waves.place, direction, waves.blocks.size)
         direction += (block_pressure(waves) - total / xp.maximum(waves.free, 1))[waves.place]

@@ -190,13 +190,13 @@ def solve_contact(
         touching = free.touching
         duality = duality_gap(free, under_load)
         rounding = duality_rounding(grid, free)
-        if free.size == 0 and is_given:  # a single cell: no step would correct the given displacement
+        if free.largest_residual == 0 and is_given:  # as with a single cell: no step would correct the displacement
             separation = problem.separation_under(pressure)
             is_given = False
             continue
 
         # The error estimate is the last requested change of pressure, scaled by the decrease of the duality gap since.
-        if free.size == 0:
+        if free.largest_residual == 0:
             error = 0.0
         elif iteration:
             error = requested_size * math.sqrt(duality / requested_duality) / max(free.total, 1e-300)
@@ -476,7 +476,7 @@ def is_solved(free: Free, error: float, tolerance: float, duality: float, roundi
     duality, rounding : float
         Duality gap, and its rounding error.
     """
-    is_empty = free.size > 0 and free.total == 0
+    is_empty = free.largest_residual > 0 and free.total == 0
     return error <= tolerance and duality <= max(GAP_SLACK * tolerance * free.energy, rounding) and not is_empty
 
 
