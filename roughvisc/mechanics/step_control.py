@@ -166,7 +166,7 @@ class Controller:
         """
         factor = max(ratio, 1e-300) ** (-1 / ORDER)
         is_too_long = REJECTED < ratio < self.refused
-        misses = 1 < at_row < self.refused_at_row and ratio > 1  # else the error is from before the pair
+        misses = 1 < at_row < self.refused_at_row
         if taken > self.shortest:
             refused = replace(self, refused=ratio, tried=max(self.tried, taken))
             if opens:  # whether or not the last trial had a larger error
@@ -287,7 +287,10 @@ def errors_over_allowed(
     if share < 1:
         scales = max(largest.force, second.size * left, scene.least_force), scales[1]
         allowed = min(allowed, max(ALLOWED_IN_HOLD * share, LEAST_SHARE * allowed))
-    return added_error(scene, pair, number, following, scales) / (allowed * scene.tolerance), row
+    ratio = added_error(scene, pair, number, following, scales) / (allowed * scene.tolerance)
+    if max(ratio, error.shared / force / (allowed * scene.tolerance)) <= 1:
+        row = 0.0  # the error is from before the pair
+    return ratio, row
 
 
 def least_approach(scene: Scene, time: float, force: float) -> float:
