@@ -23,8 +23,8 @@ from roughvisc.mechanics.scene import Packed, Point, unpacked
 
 Array = Any  # an array of NumPy or CuPy
 
-#: A direction with at most this part of the energy of the first pressure, or of its own before it was made orthogonal
-#: to the others, is left out. Its displacement, less than 1e-6 of theirs, is known to 1e-9 of itself at best.
+#: A direction is left out if its energy is at most this part of the energy of the first pressure, or of its own energy
+#: before it was made orthogonal to the others: the displacement is then less than 1e-6 of theirs, and mostly rounding.
 NEGLIGIBLE = 1e-12
 
 
@@ -156,7 +156,7 @@ def best_weights(
         pressure = compliance * pressure  # otherwise products with pressures of 1e200 Pa overflow
         for column, other in enumerate(candidates[: row + 1]):
             energies[row, column] = energies[column, row] = inner(pressure, other.displacement)
-    # The first pressure carries the load; the others, less their part of it, do not change the load.
+    # The first pressure carries the load. Along the other axes a multiple of it is subtracted: they carry no load.
     weights = np.zeros(count)
     axes = np.eye(count)
     axes[1:, 0] = -sums[1:] / sums[0]

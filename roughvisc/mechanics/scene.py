@@ -134,7 +134,7 @@ class Scene:
         return kept[bisect_right(kept, after) : bisect_right(kept, until)]
 
     def last_kept(self, time: float) -> float:
-        """Return the last kept time up to a time [s]; minus infinity if there is none, or if every step is kept."""
+        """Return the last kept time not after a time [s]; minus infinity if there is none, or if every step is kept."""
         kept = self.kept or ()
         index = bisect_right(kept, time)
         return kept[index - 1] if index else -math.inf

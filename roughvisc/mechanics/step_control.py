@@ -32,7 +32,7 @@ ALLOWED = 0.25
 ALLOWED_SOFT = 0.17
 #: While the approach is held, the force relaxes as errors do, so that the errors of all pairs add up. All pairs until
 #: the next kept time may add this many times the tolerance, each its share in the logarithm of the relaxation; and a
-#: pair at least this part of what it may add elsewhere. What is added is the difference of both solutions, three times
+#: pair at least this part of what it may add elsewhere. The difference of both solutions counts, which is three times
 #: the error. Rows beyond the tolerance: 24 of 2,000. Without ALLOWED_IN_HOLD 78, for 0.80 of the convolutions; with 4:
 #: 49, for 0.93; with 1: 15, for 1.06. With LEAST_SHARE = 0.1: 14, for 1.31; with 0.5: 36, for 0.90 (`closed_forms.py
 #: cells-one --scenes 1000 --seed 777003`).
@@ -221,7 +221,7 @@ def pair_ends(scene: Scene, number: int, now: float, length: float, *, is_first:
     end = min(end, scene.next_kept(now)) if is_first else end
     pairs = max(math.ceil((end - now) / length - SLACK), 1)
     last = end if pairs == 1 else now + (end - now) / pairs
-    latest = min(now + (1 + slack) * min(last - now, length), end)  # after a stiff pair the next one may not be longer
+    latest = min(now + (1 + slack) * min(last - now, length), end)  # BDF2 allows no longer one
     near = scene.kept_within(now + (1 - slack) * (last - now), latest)
     last = near[-1] if near else last
     middle = now + (last - now) / 2
@@ -357,9 +357,9 @@ def force_ahead(scene: Scene, pair: Pair, following: float, largest: Largest) ->
 def relaxed_in_hold(scene: Scene, pair: Pair, number: int, following: float) -> tuple[float, float]:
     """Return the part of the force that is left at the next kept time, and the share of a pair in the relaxation.
 
-    The share is that of logarithms, in the relaxation from the last kept time to the next one. Both results are one if
-    the approach is not held until then, if the surfaces are open, or if no relaxation function is known. The parameters
-    are those of :func:`added_error`.
+    The share is the ratio of the logarithm of the relaxation in the pair to that from the last kept time to the next
+    one. Both results are one if the approach is not held until then, if the surfaces are open, or if no relaxation
+    function is known. For the parameters see :func:`added_error`.
     """
     segment = scene.program.segments[number]
     began, end = scene.program.corners[number : number + 2]

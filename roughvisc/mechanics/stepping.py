@@ -550,7 +550,7 @@ def accepted(
         # it; at the end of another pair only the shared part counts.
         uncertain = uncertain_force_of_entered(scene, start, point)
         uncertain = uncertain if pair.is_soft else max(uncertain, shared_error_of_entered(scene, start, point))
-        # the larger errors contain the former ones, but for friction and the shared error, which `with_former` adds
+        # the larger errors contain the former ones; `with_former` adds friction and the shared error
         between = with_former(replace(stated.or_larger(former, left), shared=uncertain), point)
         between = with_late_entry(between, point)
         curved = math.hypot(state.work_curved, first_error if point.time <= pair.first.time else last_error)

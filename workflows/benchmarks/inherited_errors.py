@@ -60,21 +60,21 @@ def rows(drawn):
 def main(cases=50, seed=818181):
     """Print the shares; return differences, own errors and largest errors so far, shape (rows, 3)."""
     logging.getLogger("roughvisc").setLevel(logging.ERROR)
-    found = []
+    records = []
     for number in range(cases):
         drawn = case(seed, number)
         if drawn.families["material"] != "elastic":
             try:
                 with limited(TIME_LIMIT):
-                    found += rows(drawn)
+                    records += rows(drawn)
             except (rv.RoughviscError, TimeoutError) as error:
                 print(f"case {number}: {error}")
-    off, own, so_far = np.array(found).T
+    off, own, so_far = np.array(records).T
     for inherited in (0.25, 0.5, 1.0):
         ratio = off / np.maximum(own + inherited * so_far, FLOOR)
         share, median, high = np.mean(ratio > 1), np.median(ratio), np.quantile(ratio, 0.99)
         print(f"INHERITED {inherited}: {share:.1%} of {off.size} rows above, median {median:.2f}, 99 % {high:.1f}")
-    return np.array(found)
+    return np.array(records)
 
 
 if __name__ == "__main__":

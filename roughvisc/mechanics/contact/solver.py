@@ -10,7 +10,7 @@ The method is constrained conjugate gradients on an evolving contact area [1]_. 
    with the grid. The direction is conjugate to the last step taken, even if that step was cut at zero pressure.
 2. A step is cut at zero pressure first. One convolution then gives the minimum along it and the new displacement.
 3. The iteration stops at the estimated error of the pressure, not at the change of the pressure, which can stall. The
-   preconditioned residual is such an estimate.
+   preconditioned residual estimates this error.
 4. A step that does not descend is shortened, and finally replaced by a projected-gradient step, which always descends.
    A projected-gradient step is also taken if the duality gap has not halved in 30 iterations.
 5. Without a first guess, under a load and from 256 cells a side, the contact is solved on half the cells first.
@@ -219,8 +219,8 @@ def solve_contact(
         previous = response = None  # frees the last response before the next one is computed
         requested_size *= CAUTION if waves is None else CAUTION_WITH_BLOCKS
         requested_duality = max(duality, 1e-300)
-        # The preconditioned residual estimates the error now, without another convolution. Not before the first step:
-        # the displacement of a first guess is not accurate enough.
+        # The preconditioned residual estimates the present error without another convolution. It does not count before
+        # the first step, because the displacement of a first guess is not accurate enough.
         estimate = requested_size / max(free.total, 1e-300)
         if not is_given and is_solved(free, estimate, tolerance, duality, rounding):
             estimate += load_error(problem, pressure, separation, free)

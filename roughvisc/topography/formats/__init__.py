@@ -37,7 +37,7 @@ READERS: dict[str, tuple[Sequence[str], Callable[[Path], ScanFile]]] = {
 }
 #: Formats to try, in this order, for suffixes that are also used for other content.
 _SHARED = {"dat": ("metropro", "txt"), "h5": ("nc", "h5")}
-#: Formats with a reader in this package that are recognised by their content.
+#: Formats that this package reads and that their content identifies.
 _BY_CONTENT = ("x3p", "sdf", "npy", "sur")
 #: Suffix -> kind of a file that no reader reads or that holds no heights, and what to export instead.
 _PICTURE = "a picture without heights: expected the heights, such as .x3p, .sur or a text matrix, from the instrument"
@@ -91,23 +91,23 @@ def open_file(path: Path, format: str | None) -> ScanFile:
     if format is None and (export := _EXPORTS.get(_suffix(path))):
         raise InputError(f"it is {export}", key="format", found=path.suffix)
     if content := _format_of_content(path, names):
-        known = f"{content!r}, the format of the content"
-        raise InputError(key="format", found=format or path.suffix, expected=known)
+        expected = f"{content!r}, the format of the content"
+        raise InputError(key="format", found=format or path.suffix, expected=expected)
     raise ValueError("; ".join(failures))
 
 
-def _format_of_content(path: Path, but: Sequence[str]) -> str | None:
-    """Return the format that can read a file, apart from some formats; None if none can."""
+def _format_of_content(path: Path, tried: Sequence[str]) -> str | None:
+    """Return the format whose reader opens a file, other than the tried ones; None if there is none."""
     from SurfaceTopography.IO import detect_format
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        for name in _BY_CONTENT:
+        for name in (name for name in _BY_CONTENT if name not in tried):
             with suppress(Exception), closing(READERS[name][1](path)):  # readers raise many types
                 return name
         with suppress(Exception):
             detected = str(detect_format(str(path)))
-            return None if detected in but else detected
+            return None if detected in tried or detected in READERS else detected
     return None
 
 

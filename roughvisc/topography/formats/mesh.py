@@ -33,7 +33,7 @@ def read_stl(path: Path) -> ScanFile:
     else:
         vertices = _VERTEX.findall(content)
         if not content.lstrip().startswith(b"solid") or len(vertices) % 3 or b"endsolid" not in content:
-            raise ValueError("not a complete STL file, neither binary nor text")
+            raise ValueError("neither a binary nor a text STL file, or not a complete one")
         corners = np.array(vertices, dtype=float).reshape(-1, 3, 3)
     return _mesh("stl", corners)
 
@@ -44,7 +44,7 @@ def read_ply(path: Path) -> ScanFile:
     head, mark, body = content.partition(b"end_header")
     lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
     if not mark or lines[:1] != [["ply"]]:
-        raise ValueError("no whole header of PLY")
+        raise ValueError("the header of a PLY file is missing or incomplete")
     body = body[body.index(b"\n") + 1 :]
     notation = next(words[1] for words in lines if words[:1] == ["format"])
     elements = [(words[1], int(words[2]), list[list[str]]()) for words in lines if words[:1] == ["element"]]
