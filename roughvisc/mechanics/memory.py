@@ -130,6 +130,8 @@ class Memory:
         #: Contact compliance after a time [s], cached because few times recur often. [1/Pa]
         self.compliance = cast(Callable[[float], float], lru_cache(maxsize=64)(series.contact_compliance))
         self.glassy = factor * series.glassy
+        #: Contact compliance at the end of the program. [1/Pa]
+        self.final = self.compliance(duration)
         flow = [series.fluidity] if series.fluidity else []
         self.compliances = factor * np.array([*series.compliances, *flow])
         self.times = np.array([*series.times, *([np.inf] if flow else [])])
@@ -169,7 +171,8 @@ class Memory:
 
     def grows(self, step: float, factor: float) -> bool:
         """Return whether the compliance grows by more than a factor within a step of some length [s]."""
-        return self.compliance(step) > factor * self.glassy
+        least = factor * self.glassy
+        return self.final > least and self.compliance(step) > least
 
     def start(self, nothing: Array) -> History:
         """Return the memory of a body at rest, from an array of zeros, shape (nx, ny)."""

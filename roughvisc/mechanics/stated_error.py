@@ -4,8 +4,8 @@ The fine solution takes a pair of steps, the coarse solution takes the pair as o
 difference, times a factor, as the error at the end of the pair. The difference may miss an error:
 
 - it has parts of first and of second order and may pass through zero (:meth:`StepErrors.at_least`);
-- the pressure of a cell that has just entered the contact is uncertain (:func:`uncertain_force_of_entered`,
-  :func:`shared_error_of_entered`, :func:`error_of_late_entry`);
+- the pressure of a cell that has just entered the contact is uncertain (:func:`uncertain_part`, :func:`shared_part`,
+  :func:`error_of_late_entry`);
 - slow slides have a phase error at one and at two cells a step (:func:`phase_error`);
 - their first step misses friction and pressure (:func:`skipped_friction`, :func:`skipped_pressure`).
 
@@ -194,10 +194,8 @@ def difference(
     cells = int(contact.sum())
     uncertain = 0.0
     if cells and is_soft:
-        uncertain = (
-            uncertain_force_of_entered(scene, before, fine)
-            + PRESSURE_OF_LATE * float(outside.sum()) * fine.size / cells
-        )
+        uncertain = uncertain_part(scene.memory, fine.time - before.time) * force_of_entered(scene, before, fine)
+        uncertain += PRESSURE_OF_LATE * float(outside.sum()) * fine.size / cells
     return replace(
         error,
         pressure=error.pressure + uncertain,
@@ -206,17 +204,81 @@ def difference(
     )
 
 
-def uncertain_force_of_entered(scene: Scene, before: Point, after: Point) -> float:
-    """Return the uncertain force of cells that have entered between two points. [N]"""
-    compliance = scene.memory.compliance(after.time - before.time)
-    creeping = 1 - scene.memory.compliance(0.0) / compliance if compliance > 0 else 0.0
-    return UNCERTAIN_OF_ENTERED * creeping * force_of_entered(scene, before, after)
+def uncertain_part(memory: Memory, step: float) -> float:
+    """Return the uncertain part of the pressure of a cell that has entered within a step of some length [s]."""
+    compliance = memory.compliance(step)
+    return UNCERTAIN_OF_ENTERED * (1 - memory.glassy / compliance) if compliance > 0 else 0.0
 
 
-def shared_error_of_entered(scene: Scene, before: Point, after: Point) -> float:
-    """Return the error of the pressure of entered cells that both solutions of a pair share. [N]"""
-    creep = scene.memory.compliance(after.time - before.time) / scene.memory.compliance(0.0) - 1
-    return min(SHARED * creep**2, 1.0) * force_of_entered(scene, before, after)
+def shared_part(memory: Memory, step: float) -> float:
+    """Return the error of this pressure that both solutions of a pair share, as a part of it; see `SHARED`."""
+    return min(SHARED * (memory.compliance(step) / memory.glassy - 1) ** 2, 1.0)
+
+
+def with_former(
+    scene: Scene,
+    start: Point,
+    point: Point,
+    error: StepErrors,
+    former: StepErrors,
+    slide: Slide | None,
+    *,
+    is_soft: bool,
+) -> StepErrors:
+    """Return the stated errors at a point of a pair, from its own errors and the errors before it.
+
+    Parameters
+    ----------
+    scene : Scene
+        Input of the time stepping.
+    start, point : Point
+        Fine solution before the pair, and at a point of the pair.
+    error, former : StepErrors
+        Errors of the pair at the point, and errors before the pair.
+    slide : Slide or None
+        Motion, if the error of the friction force is needed.
+    is_soft : bool
+        Whether hardly any of the compliance of the pair is instantaneous.
+    """
+    left = scene.memory.remaining(point.time - start.time)
+    of_friction = 0.0
+    if slide is not None and former.friction > 0:
+        of_friction, unresolved = left_of_friction(scene, start, point, slide)
+        error = replace(error, friction=max(error.friction, unresolved))
+    return error.at_least(former, left, of_friction, is_soft=is_soft)
+
+
+def stated_inside(
+    scene: Scene,
+    start: Point,
+    point: Point,
+    at_end: StepErrors,
+    former: StepErrors,
+    slide: Slide | None,
+    *,
+    is_soft: bool,
+) -> StepErrors:
+    """Return the stated errors of a row inside a pair, where no coarse solution exists.
+
+    They are the larger ones of both ends of the pair, and the uncertain pressure of entered cells. At its end the
+    difference contains this pressure if the pair is soft; otherwise only the shared part counts there.
+
+    Parameters
+    ----------
+    at_end : StepErrors
+        Stated errors at the end of the pair.
+    scene, start, point, former, slide, is_soft
+        See :func:`with_former`.
+    """
+    step = point.time - start.time
+    left = 1.0 if is_soft else scene.memory.remaining(step)
+    entered = force_of_entered(scene, start, point)
+    uncertain = 0.0
+    if entered:
+        uncertain = uncertain_part(scene.memory, step) * entered
+        uncertain = uncertain if is_soft else max(uncertain, shared_part(scene.memory, step) * entered)
+    error = replace(at_end.or_larger(former, left), shared=uncertain)
+    return with_former(scene, start, point, error, former, slide, is_soft=is_soft)
 
 
 def error_of_late_entry(scene: Scene, before: Point, after: Point, error: float, former: tuple[float, float]) -> float:
@@ -392,10 +454,10 @@ def work_of_pair(
         path = [start, *points]
         works = np.cumsum([work_of_step(scene, *ends) for ends in zip(path, points, strict=False)]).tolist()
         return works, uncertain * abs(straight[0]), uncertain * abs(straight[1])
-    force = np.polynomial.Polynomial([begin[0], slopes[0], bends[0]])
-    rate = np.polynomial.Polynomial([slopes[1], 2 * bends[1]])
-    integral = (force * rate).integ()
-    curved = [float(integral(time)) for time in (early, last)]
+    # coefficients of the integral of the force, a + b t + c t^2, times the rate of the approach, d + 2 e t
+    a, (b, d), (c, e) = float(begin[0]), slopes.tolist(), bends.tolist()
+    coefficients = a * d, (b * d + 2 * a * e) / 2, (c * d + 2 * b * e) / 3, c * e / 2
+    curved = [sum(part * time**power for power, part in enumerate(coefficients, 1)) for time in (early, last)]
     arches = curved[0] - straight[0], curved[1] - curved[0] - straight[1] + straight[0]
     works = []
     for point in inside:  # the straight line to the point itself, and its part of the arch above the step

@@ -20,7 +20,7 @@ from roughvisc.mechanics.stated_error import StepErrors, stated_over_difference
 #: Length of the first pair after an event, as a part of the segment: contact changes fast after a corner. Also the
 #: shortest pair that is repeated in halves because it misses the tolerance at a kept time, as a part of the time since
 #: the segment began: without a shortest one 1.05, 1.03, 1.01, and no fewer rows beyond.
-FIRST_PAIR = 0.005
+FIRST_PAIR = 0.01
 #: Growth of the compliance in the first pair after a jump. In a longer pair the pressure would relax far within a step,
 #: and both solutions would share an error of the slow exponentials: `closed_forms.py cells-one waves`, bad rows.
 RESOLVED = 1.5
@@ -41,11 +41,9 @@ LEAST_SHARE = 0.3
 #: Order of the error of a pair in its length, observed: cells enter and leave the contact within steps. With 2: 0.96,
 #: 0.94, 0.99, and 5 and 12 rows beyond instead of 3 and 6.
 ORDER = 1.5
-#: Ratio of the lengths of successive pairs: smallest and largest. If the memory uses BDF2, a pair that ends later
-#: than planned must not grow by more than LARGEST_GROWTH. At least 0.5: 0.96, 0.97, 0.99, and 4 and 11 rows beyond
-#: instead of 3 and 6. At most 2.3: 0.99, 0.99, 1.00. At most 3.5 with BDF2 too: 1.9, 1.5, 1.4.
+#: Smallest ratio of the lengths of successive pairs. At least 0.5: 0.96, 0.97, 0.99, and 4 and 11 rows beyond instead
+#: of 3 and 6. The largest follows from LARGEST_GROWTH: a pair may end later than planned (SLACK).
 SHRINK = 0.3
-GROW = 3.5
 #: Least part of an error that counts as remaining after relaxation, because other errors do not fade. With
 #: zero `closed_forms.py work-approach --seed 778` has 43 rows of 813 beyond the tolerance instead of 33.
 LEAST_REMAINING = 0.02
@@ -62,10 +60,9 @@ PAIRS_OF_A_CYCLE = 8
 #: A pair ends at a kept time, or at the end of its segment, that lies within this part of its length around its end.
 #: With 0.05: 0.93, 0.97, 1.01, and 3 and 4 rows beyond instead of 3 and 6; with 0.4: 0.96, 0.98, 1.00, 3 and 2.
 SLACK = 0.2
-#: Times that differ by less than this part of a pair, a period, or the time to the next event are equal.
+#: Times that differ by less than this part of a pair, a period, or the time to the next event are equal; approaches, if
+#: they differ by less than this part of the largest displacement that the mean pressure could cause.
 ROUNDED = 1e-9
-#: Rounding of displacements, relative to the largest displacement that the mean pressure could cause.
-ROUNDING = 1e-11
 
 
 @dataclass(frozen=True)
@@ -129,9 +126,6 @@ class Controller:
     ----------
     shortest : float
         Pairs that are not longer are accepted. [s]
-    growth : float
-        Largest ratio of the lengths of the next pair and this one: `GROW`, or `LARGEST_GROWTH` if a trial of the pair
-        before was refused. With `GROW` always, every second pair of a relaxation is refused.
     refused : float
         Added error of the last refused trial of this pair, over the allowed error.
     refused_at_row : float
@@ -141,14 +135,11 @@ class Controller:
     """
 
     shortest: float
-    growth: float = GROW
     refused: float = math.inf
     refused_at_row: float = math.inf
     tried: float = 0.0
 
-    def judge(
-        self, taken: float, ratio: float, at_row: float, *, opens: bool, is_stiff: bool
-    ) -> tuple[Controller | None, float]:
+    def judge(self, taken: float, ratio: float, at_row: float, *, opens: bool) -> tuple[Controller | None, float]:
         """Return the controller and the length of the next trial, or None and the length of the next pair. [s]
 
         Parameters
@@ -161,8 +152,6 @@ class Controller:
             Error at the end of the pair, over the tolerance, if the pair may be repeated for its row; otherwise zero.
         opens : bool
             Whether contact seems to end although it should not: too long a step may undershoot.
-        is_stiff : bool
-            Whether the memory may use BDF2 in the next pair.
         """
         factor = max(ratio, 1e-300) ** (-1 / ORDER)
         is_too_long = REJECTED < ratio < self.refused
@@ -175,7 +164,7 @@ class Controller:
                 return refused, taken * max(factor, SHRINK)
             if misses:
                 return replace(refused, refused_at_row=at_row), 0.5 * taken
-        largest = min(LARGEST_GROWTH / (1 + SLACK) if is_stiff else GROW, self.growth)
+        largest = LARGEST_GROWTH / (1 + SLACK)
         if self.refused <= ratio:  # the error does not depend on the length, and the next pair need not be as short
             return None, min(self.tried, largest * taken)
         if self.refused < math.inf:  # after a refused trial steps do not grow (Hairer, Norsett, Wanner I, section II.4)
@@ -305,7 +294,7 @@ def least_approach(scene: Scene, time: float, force: float) -> float:
     time, force : float
         Time [s], and largest force until then. [N]
     """
-    rounding = ROUNDING * scene.memory.compliance(time) * scene.grid.largest_eigenvalue
+    rounding = ROUNDED * scene.memory.compliance(time) * scene.grid.largest_eigenvalue
     return max(rounding * force / (scene.gap.size * scene.grid.cell_area), 1e-300)
 
 
@@ -386,7 +375,9 @@ def added_error(scene: Scene, pair: Pair, number: int, following: float, scales:
     """Return the error that a pair adds at the next kept time: of pressure, approach, and displaced surface.
 
     The error is the change of the difference between both solutions over the pair, from its value before the pair or
-    from the part that relaxation leaves of this value.
+    from the part that relaxation leaves of this value. The errors of pairs add up: if the error stated for what is left
+    of the difference before the pair exceeds the tolerance, the error of the pair counts as many times, at most
+    `REJECTED` times.
 
     Parameters
     ----------
@@ -398,6 +389,7 @@ def added_error(scene: Scene, pair: Pair, number: int, following: float, scales:
         Force and approach to which errors are relative. [N, m]
     """
     memory = scene.memory
+    factor, factor_of_approach = stated_over_difference(scene)
     second = pair.second
     coarse_end = pair.coarse_end
     taken = pair.length
@@ -419,11 +411,14 @@ def added_error(scene: Scene, pair: Pair, number: int, following: float, scales:
             left = memory.remaining(taken / 2)
         remains = max(memory.remaining(ahead) / left if left > 0 else 0.0, LEAST_REMAINING)
     error = change * scene.grid.cell_area / scales[0] * remains
+    before = factor * float(abs(at_start).sum()) * scene.grid.cell_area / scales[0] * remains
+    before *= 1.0 if is_soft else memory.remaining(taken)
     if by_load:
-        of_approach = (second.approach - coarse_end.approach) - (pair.start.approach - pair.coarse_start.approach)
-        error = max(error, abs(of_approach) / scales[1])
+        approach_at_start = pair.start.approach - pair.coarse_start.approach
+        error = max(error, abs(second.approach - coarse_end.approach - approach_at_start) / scales[1])
+        before = max(before, factor_of_approach * abs(approach_at_start) / scales[1])
     if not by_load or second.is_open or is_soft:
         surface = memory.displacement(second.history)[0] - memory.displacement(coarse_end.history)[0]
         surface -= memory.displacement(pair.start.history)[0] - memory.displacement(pair.coarse_start.history)[0]
         error = max(error, float(abs(surface).max()) / scales[1] * (1.0 if is_soft or receding else remains))
-    return error
+    return error * min(max(before / scene.tolerance, 1.0), REJECTED)

@@ -27,7 +27,7 @@ from roughvisc.mechanics.adhesive_step import GROWTH, JUMP, dissipated, longest_
 from roughvisc.mechanics.contact.adhesive import Unstable
 from roughvisc.mechanics.contact.solver import solve_contact
 from roughvisc.mechanics.first_guess import Candidate, around_coarse, both_ends, combination, first_guess, last_two
-from roughvisc.mechanics.memory import LARGEST_GROWTH, STIFF, Rule
+from roughvisc.mechanics.memory import Rule
 from roughvisc.mechanics.program import Segment, Slide, instant
 from roughvisc.mechanics.scene import SOFT, Array, Packed, Point, Scene
 from roughvisc.mechanics.stated_error import (
@@ -38,19 +38,18 @@ from roughvisc.mechanics.stated_error import (
     error_of_late_entry,
     force_of_entered,
     friction,
-    left_of_friction,
     phase_error,
-    shared_error_of_entered,
+    shared_part,
     skipped_friction,
     skipped_pressure,
+    stated_inside,
     touch,
     transient_error,
-    uncertain_force_of_entered,
+    with_former,
     work_of_pair,
     work_of_step,
 )
 from roughvisc.mechanics.step_control import (
-    GROW,
     PAIRS_OF_A_CYCLE,
     ROUNDED,
     SHORTEST_PAIR,
@@ -111,8 +110,6 @@ class State:
     peak : tuple of float
         Force, approach and time of the last step whose force exceeded what relaxation had left of the peak before it.
         [N, m, s]
-    growth : float
-        Largest ratio of the lengths of the pair after the next one and of the next one.
     entered : tuple of float
         Force on the cells of a soft body that entered last, within the error of the gap, and the approach then. [N, m]
     distance : float
@@ -137,7 +134,6 @@ class State:
     work_relaxed: float = 0.0
     dissipated: float = 0.0
     peak: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    growth: float = GROW
     entered: tuple[float, float] = (0.0, 0.0)
     distance: float = 0.0
     convolutions: int = 0
@@ -402,7 +398,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
     length = state.next_length or first_length(scene, segment, jumped)
     if segment.amplitude:
         length = min(length, segment.period / PAIRS_OF_A_CYCLE)
-    controller = Controller(shortest_length(scene, number), state.growth)
+    controller = Controller(shortest_length(scene, number))
     by_load = segment.control == "load"
     largest = Largest(
         state.kept_force,
@@ -418,7 +414,8 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         slide = scene.motions[number] if times else None
         error = difference(scene, start, at_end, coarse_at_end, slide, is_kept=bool(times))
         if times and not pair.is_soft:  # only pairs with a kept row add to the shared error
-            error = replace(error, shared=shared_error_of_entered(scene, start, pair.second))
+            entered = force_of_entered(scene, start, pair.second)
+            error = replace(error, shared=shared_part(scene.memory, pair.length) * entered)
         if scene.time_step is not None:
             next_length = length
             break
@@ -426,8 +423,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         ratio, at_row = errors_over_allowed(scene, pair, number, error, shared, largest, has_row=bool(times))
         loses_contact = not start.is_open and (pair.first.is_open or pair.second.is_open)
         opens = not by_load and loses_contact and pair.second.approach >= start.approach
-        is_stiff = scene.memory.grows(GROW * pair.length, STIFF)
-        again, proposed = controller.judge(pair.length, ratio, at_row, opens=opens, is_stiff=is_stiff)
+        again, proposed = controller.judge(pair.length, ratio, at_row, opens=opens)
         if again is None:
             next_length = proposed
             break
@@ -435,9 +431,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         length = proposed
         del pair, at_end, coarse_at_end  # frees their memory while the pair is repeated
 
-    # the largest growth after the next pair
-    growth = LARGEST_GROWTH if controller.refused < math.inf else GROW
-    return accepted(scene, replace(state, growth=growth), pair, at_end, times, error, next_length)
+    return accepted(scene, state, pair, at_end, times, error, next_length)
 
 
 def solve_pair(scene: Scene, state: State, middle: float, last: float, *, has_row: bool) -> tuple[Pair, Point, Point]:
@@ -490,20 +484,11 @@ def accepted(
         Length of the next pair. [s]
     """
     start = pair.start
-    memory = scene.memory
     number = state.segment
     former = state.errors
     slide = scene.motions[number]
 
-    def with_former(error: StepErrors, point: Point) -> StepErrors:
-        left = memory.remaining(point.time - start.time)
-        of_friction = 0.0
-        if slide is not None and former.friction > 0:
-            of_friction, unresolved = left_of_friction(scene, start, point, slide)
-            error = replace(error, friction=max(error.friction, unresolved))
-        return error.at_least(former, left, of_friction, is_soft=pair.is_soft)
-
-    stated = with_former(error, pair.second)
+    stated = with_former(scene, start, pair.second, error, former, slide, is_soft=pair.is_soft)
 
     def with_late_entry(error: StepErrors, point: Point) -> StepErrors:
         if not pair.is_soft:
@@ -545,13 +530,7 @@ def accepted(
     steps = []
     of_work = max(state.work_difference, after.work_difference, key=abs)
     for point, work in zip(inside, works[:-1], strict=True):
-        left = 1.0 if pair.is_soft else memory.remaining(point.time - start.time)
-        # No coarse solution at this time shows the uncertain force. At the end of a soft pair the difference contains
-        # it; at the end of another pair only the shared part counts.
-        uncertain = uncertain_force_of_entered(scene, start, point)
-        uncertain = uncertain if pair.is_soft else max(uncertain, shared_error_of_entered(scene, start, point))
-        # the larger errors contain the former ones; `with_former` adds friction and the shared error
-        between = with_former(replace(stated.or_larger(former, left), shared=uncertain), point)
+        between = stated_inside(scene, start, point, stated, former, slide, is_soft=pair.is_soft)
         between = with_late_entry(between, point)
         curved = math.hypot(state.work_curved, first_error if point.time <= pair.first.time else last_error)
         within = replace(
