@@ -88,7 +88,8 @@ class State:
     segment : int
         Index of the segment of the program.
     next_length : float
-        Length of the next pair; zero: :func:`first_length` chooses it. [s]
+        Length of the next pair. [s] Zero if no pair leads to it: at the start, after a jump, a slide or a change of
+        control (:attr:`Corner.is_smooth`), and while the surfaces are open. :func:`first_length` then chooses it.
     errors : StepErrors
         Stated error of the time steps.
     largest_force, largest_approach : float
@@ -207,7 +208,7 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
         is_start = state.fine.time == 0
         if not is_jump:
             slide = segment.slide
-            steps = pair_of_steps(scene, state, segment) if slide is None else pair_of_cells(scene, state, slide)
+            steps = next_steps(scene, state, segment) if slide is None else pair_of_cells(scene, state, slide)
         elif scene.can_jump:
             steps = [single_step(scene, state, state.fine.time)]
         else:  # the next step takes the jump
@@ -376,8 +377,11 @@ def step_while_open(scene: Scene, state: State, closes: float) -> Step:
     return step._replace(errors=replace(step.errors, pressure=largest, force=largest, shared=0.0))
 
 
-def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
-    """Return the next accepted steps of a segment: a pair, or one step. The last step has the state after them."""
+def next_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
+    """Return the next accepted steps of a ramp or a hold: a step of open surfaces or of an elastic body, or a pair.
+
+    The last step has the state after them.
+    """
     start = state.fine
     number = state.segment
     began, end = scene.program.corners[number : number + 2]
@@ -392,7 +396,13 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         longest = (end - began) / 20 if scene.kept is None else math.inf
         parts = max(math.ceil((event - start.time) / (scene.time_step or longest) * (1 - ROUNDED)), 1)
         return [single_step(scene, state, start.time + (event - start.time) / parts if parts > 1 else event)]
+    return pair_of_steps(scene, state, segment)
 
+
+def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
+    """Return the steps of the next pair of a ramp or a hold: the first pair that the controller accepts."""
+    start = state.fine
+    number = state.segment
     former = scene.program.segments[number - 1] if number > 0 else segment
     jumped = (former.duration == 0 or former.slide is not None) and not start.is_open
     length = state.next_length or first_length(scene, segment, jumped)
@@ -485,35 +495,16 @@ def accepted(
     """
     start = pair.start
     number = state.segment
-    former = state.errors
     slide = scene.motions[number]
+    inside = points_inside(scene, pair, times, number)
 
-    stated = with_former(scene, start, pair.second, error, former, slide, is_soft=pair.is_soft)
-
-    def with_late_entry(error: StepErrors, point: Point) -> StepErrors:
-        if not pair.is_soft:
-            return error
-        uncertain = error_of_late_entry(scene, start, point, stated.gap, state.entered)
-        return replace(error, shared=max(error.shared, uncertain))
-
-    entered = state.entered
-    force = force_of_entered(scene, start, pair.second) if pair.is_soft else 0.0
-    if force > 0:
-        earlier = entered[0] if abs(start.approach - entered[1]) <= stated.gap else 0.0
-        entered = (earlier + force, pair.second.approach)
-
-    is_row = scene.kept is None or pair.first.time in times
-    inside = [row_at_middle(scene, pair, number) if is_row else pair.first]
-    for time in times:
-        if time not in (pair.first.time, pair.second.time):
-            inside.append(row_inside(scene, pair, time, number))
-    inside.sort(key=lambda point: point.time)
-    follows_corner = start.time == scene.program.corners[number]
     works, first_error, last_error = work_of_pair(scene, start, pair.first, pair.second, inside)
-    by_load = scene.program.segments[number].control == "load"
     relaxing = 0.0
-    if follows_corner and not start.is_late:
+    if start.time == scene.program.corners[number] and not start.is_late:
+        by_load = scene.program.segments[number].control == "load"
         relaxing = transient_error(scene, start, pair.first, pair.second, by_load=by_load)
+
+    stated = with_former(scene, start, pair.second, error, state.errors, slide, is_soft=pair.is_soft)
     after = after_steps(
         scene,
         state,
@@ -524,25 +515,44 @@ def accepted(
         work=state.work + works[-1],
         work_curved=math.hypot(state.work_curved, last_error),
         work_relaxed=state.work_relaxed + relaxing,
-        entered=entered,
+        entered=last_entered(scene, pair, state.entered, stated.gap),
     )
+
+    def with_late_entry(error: StepErrors, point: Point) -> StepErrors:
+        if not pair.is_soft:
+            return error
+        uncertain = error_of_late_entry(scene, start, point, stated.gap, state.entered)
+        return replace(error, shared=max(error.shared, uncertain))
 
     steps = []
     of_work = max(state.work_difference, after.work_difference, key=abs)
     for point, work in zip(inside, works[:-1], strict=True):
-        between = stated_inside(scene, start, point, stated, former, slide, is_soft=pair.is_soft)
-        between = with_late_entry(between, point)
+        between = stated_inside(scene, start, point, stated, state.errors, slide, is_soft=pair.is_soft)
         curved = math.hypot(state.work_curved, first_error if point.time <= pair.first.time else last_error)
         within = replace(
             state, work=state.work + work, work_curved=curved, work_difference=of_work, work_relaxed=after.work_relaxed
         )
-        steps.append(Step(point, between, number, within, is_end=False))
+        steps.append(Step(point, with_late_entry(between, point), number, within, is_end=False))
     return [*steps, Step(at_end, with_late_entry(stated, at_end), number, after)]
 
 
-def row_at_middle(scene: Scene, pair: Pair, number: int) -> Point:
-    """Return the fine solution after the first step of a pair, with the pressure at that time."""
-    return with_final_pressure(scene, pair.start, pair.first, number) if pair.is_soft else pair.first
+def last_entered(scene: Scene, pair: Pair, former: tuple[float, float], error: float) -> tuple[float, float]:
+    """Return :attr:`State.entered` after a pair, from the value before it and the error of the gap at its end [m]."""
+    force = force_of_entered(scene, pair.start, pair.second) if pair.is_soft else 0.0
+    if not force > 0:
+        return former
+    earlier = former[0] if abs(pair.start.approach - former[1]) <= error else 0.0
+    return earlier + force, pair.second.approach
+
+
+def points_inside(scene: Scene, pair: Pair, times: tuple[float, ...], number: int) -> list[Point]:
+    """Return the fine solution inside a pair, in order: after its first step, and at the kept times [s] of the pair."""
+    middle = pair.first
+    if pair.is_soft and (scene.kept is None or middle.time in times):
+        middle = with_final_pressure(scene, pair.start, middle, number)
+    others = [time for time in times if time not in (middle.time, pair.second.time)]
+    points = [middle, *(row_inside(scene, pair, time, number) for time in others)]
+    return sorted(points, key=lambda point: point.time)
 
 
 def row_inside(scene: Scene, pair: Pair, time: float, number: int) -> Point:
