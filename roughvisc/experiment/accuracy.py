@@ -146,8 +146,9 @@ def error_columns(step: Step, scene: Scene) -> dict[str, float]:
     The stated error is the sum of the errors of the time steps, of the contact solver in this and earlier steps, and
     of the series. Under a given load the solver's error of the approach is the duality gap over the load, which is of
     second order in the error of the pressure. Errors of pressure, force and approach are relative to the largest
-    values of the kept rows so far and of the step. Errors of the series and of the work are relative to the largest
-    values of all steps: values left after unloading are differences of large values. Errors of the work add up.
+    values of the kept rows so far and of the step. Errors of the series and of the work are computed with the largest
+    values of all steps: values left after unloading are differences of large values. Errors of the work add up. At the
+    end of a pair the error of the solver in earlier steps contains that of the row itself.
     """
     point = step.point
     state = step.state
@@ -162,7 +163,11 @@ def error_columns(step: Step, scene: Scene) -> dict[str, float]:
     reached = max(state.largest_approach, abs(point.approach), 1e-300)
     age = point.time - scene.program.corners[step.segment]
     if age > 0 and scene.memory.early > 0:
-        change = (point.force - point.start) / loaded if control == "load" else (point.approach - point.start) / reached
+        change = (
+            (point.force - point.segment_start) / loaded
+            if control == "load"
+            else (point.approach - point.segment_start) / reached
+        )
         share = 1.0 if age < scene.memory.shortest else min(abs(change), 1.0)
         series_error += share * scene.memory.error_of_young(age)
     of_force = series_error * loaded

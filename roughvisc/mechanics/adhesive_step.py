@@ -118,7 +118,7 @@ def step_with_adhesion(
     force = value if by_load else state.load * unit
     approach = state.approach if by_load else value
     errors = state.error, state.error * abs(approach) if by_load else 0.0
-    point = Point(time, pressure, force, approach, history, previous, here.start, False, *errors)
+    point = Point(time, pressure, force, approach, history, previous, here.segment_start, False, *errors)
     size = float(abs(pressure).sum()) * grid.cell_area
     return replace(point, gap=state.gap, integral=size, is_unstable=state.is_unstable)
 

@@ -258,7 +258,10 @@ class Memory:
         return namespace(fields).roll(fields, -cells, axis - 2)
 
     def remaining(self, time: float) -> float:
-        """Return the part of an error of the history that relaxation leaves after a time. [s]"""
+        """Return the part of an error of the history that relaxation leaves after a time. [s]
+
+        The displacement is held: it is fixed in the contact, under a given load up to the approach.
+        """
         left = float((self.parts * np.exp(-self.rates * time)).sum() / self.parts.sum())
         return min(max(left, 0.0), 1.0)
 

@@ -204,8 +204,8 @@ class Point:
         Memory of the body.
     previous : tuple or None
         Time, stored pressure, and displacement per unit compliance of the last point, for the next first guess.
-    start : float
-        Force [N] or approach [m] at the start of the segment, if the program does not state it.
+    segment_start : float
+        Force [N] or approach [m] at the start of the segment.
     is_late : bool
         Whether the prescribed value has jumped and the body has no instantaneous compliance.
     solver_error, solver_error_approach : float
@@ -224,7 +224,7 @@ class Point:
     approach: float
     history: History
     previous: tuple[float, Array | Packed, Array | None] | None = None
-    start: float = 0.0
+    segment_start: float = 0.0
     is_late: bool = False
     solver_error: float = 0.0
     solver_error_approach: float = 0.0

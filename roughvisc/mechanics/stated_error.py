@@ -74,7 +74,8 @@ class StepErrors:
     friction : float
         Error of the friction force of a slide. [N]
     shared : float
-        Further error of the pressure that both solutions share: in cells that have entered, in slides by one cell. [N]
+        Further error of the pressure, which the difference does not contain because both solutions share it: in cells
+        that have entered, and in slides by one cell. It is added to `pressure`. [N]
     gap : float
         Error of the gap of a soft body. [m]
     """
@@ -92,6 +93,8 @@ class StepErrors:
         self, former: StepErrors, left: float, left_of_friction: float = 0.0, *, is_soft: bool = False
     ) -> StepErrors:
         """Return the errors, each at least a part of the error before a pair; both shared errors add up.
+
+        The uncertain areas remain: they belong to an instant.
 
         Parameters
         ----------
@@ -123,10 +126,10 @@ class StepErrors:
         other : StepErrors
             Other errors.
         left : float
-            Part of them that relaxation leaves; errors of the approach and of the gap do not fade.
+            Part of them that relaxation leaves; uncertain areas and the errors of approach and gap do not fade.
         """
         parts = {name: error * left for name, error in vars(other).items()}
-        parts |= {"approach": other.approach, "gap": other.gap}
+        parts |= {name: getattr(other, name) for name in ("approach", "gap", "inside", "outside")}
         return StepErrors(**{name: max(error, parts[name]) for name, error in vars(self).items()})
 
 
@@ -225,7 +228,7 @@ def with_former(
     *,
     is_soft: bool,
 ) -> StepErrors:
-    """Return the stated errors at a point of a pair, from its own errors and the errors before it.
+    """Return the stated errors at a point of a pair, from those of the difference and those before the pair.
 
     Parameters
     ----------
@@ -234,7 +237,7 @@ def with_former(
     start, point : Point
         Fine solution before the pair, and at a point of the pair.
     error, former : StepErrors
-        Errors of the pair at the point, and errors before the pair.
+        Errors from the difference at the point, and stated errors before the pair.
     slide : Slide or None
         Motion, if the error of the friction force is needed.
     is_soft : bool
@@ -278,6 +281,7 @@ def stated_inside(
         uncertain = uncertain_part(scene.memory, step) * entered
         uncertain = uncertain if is_soft else max(uncertain, shared_part(scene.memory, step) * entered)
     error = replace(at_end.or_larger(former, left), shared=uncertain)
+    # adds the friction, and what is left of the former shared error
     return with_former(scene, start, point, error, former, slide, is_soft=is_soft)
 
 

@@ -17,7 +17,7 @@ from roughvisc.mechanics.program import Segment
 from roughvisc.mechanics.scene import Point, Scene
 from roughvisc.mechanics.stated_error import StepErrors, stated_over_difference
 
-#: Length of the first pair after an event, as a part of the segment: contact changes fast after a corner. Also the
+#: Length of the first pair after a corner that is not smooth, as a part of the segment: contact changes fast. Also the
 #: shortest pair that is repeated in halves because it misses the tolerance at a kept time, as a part of the time since
 #: the segment began: without a shortest one 1.05, 1.03, 1.01, and no fewer rows beyond.
 FIRST_PAIR = 0.01
@@ -157,13 +157,13 @@ class Controller:
         is_too_long = REJECTED < ratio < self.refused
         misses = 1 < at_row < self.refused_at_row
         if taken > self.shortest:
-            refused = replace(self, refused=ratio, tried=max(self.tried, taken))
+            again = replace(self, refused=ratio, tried=max(self.tried, taken))
             if opens:  # whether or not the last trial had a larger error
                 return self, SHRINK * taken
             if is_too_long:
-                return refused, taken * max(factor, SHRINK)
+                return again, taken * max(factor, SHRINK)
             if misses:
-                return replace(refused, refused_at_row=at_row), 0.5 * taken
+                return replace(again, refused_at_row=at_row), 0.5 * taken
         largest = LARGEST_GROWTH / (1 + SLACK)
         if self.refused <= ratio:  # the error does not depend on the length, and the next pair need not be as short
             return None, min(self.tried, largest * taken)
@@ -188,9 +188,9 @@ def shortest_length(scene: Scene, number: int) -> float:
 def pair_ends(scene: Scene, number: int, now: float, length: float, *, is_first: bool) -> tuple[float, float]:
     """Return the middle and the end of the next pair of about a given length in a segment. [s]
 
-    The last kept time near the end of the pair becomes its end. The first pair of a new length (`is_first`) ends at a
-    kept time at the latest, because a fast relaxation in it may be over at its end. If `scene.time_step` is fixed,
-    steps are at most that long, and kept times are the middle or the end of pairs.
+    The last kept time near the end of the pair becomes its end. The first pair after a corner that is not smooth
+    (`is_first`) ends at a kept time at the latest, because a fast relaxation in it may be over at its end. If
+    `scene.time_step` is fixed, steps are at most that long, and kept times are the middle or the end of pairs.
     """
     segment = scene.program.segments[number]
     began, end = scene.program.corners[number : number + 2]
@@ -228,12 +228,12 @@ def errors_over_allowed(
     *,
     has_row: bool,
 ) -> tuple[float, float]:
-    """Return the error that a pair adds at the next kept time, over the allowed error, and its error at a kept row.
+    """Return the error that a pair adds at the next kept time, over the allowed error, and the error at its end.
 
-    If the pair has a kept row, its end counts as the next kept time. The error at a kept row is relative to the
-    tolerance, and zero if the pair may not be repeated for it. Errors are relative to the largest force and approach of
-    the kept rows, of the pair, and of the next row as far as it is known. While the approach is held, they are relative
-    to the largest force of the kept rows and the force that relaxation leaves until the next one.
+    If the pair has a kept row, its end counts as the next kept time. The error at the end is relative to the tolerance,
+    and zero if the end is not kept or the pair may not be repeated for it. Errors are relative to the largest force and
+    approach of the kept rows, of the pair, and of the next row as far as it is known. While the approach is held, they
+    are relative to the largest force of the kept rows and the force that relaxation leaves until the next one.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ def errors_over_allowed(
     number : int
         Index of the segment.
     error : StepErrors
-        Error of the pair at its end, without the errors before it.
+        Error at the end of the pair, from the difference of both solutions.
     shared : float
         Error of the pressure that both solutions share, what is left from before the pair included. [N]
     largest : Largest
@@ -261,7 +261,7 @@ def errors_over_allowed(
     row = 0.0
     factor, factor_of_approach = stated_over_difference(scene)
     # a pair that is short for its place in the segment is not repeated: see FIRST_PAIR
-    if has_row and scene.keeps(second.time) and taken > FIRST_PAIR * (second.time - scene.program.corners[number]):
+    if scene.keeps(second.time) and taken > FIRST_PAIR * (second.time - scene.program.corners[number]):
         # the whole difference, or the stated error with the shared one, whichever is larger
         of_pressure = max(error.pressure / factor, error.pressure + shared) / force
         row = max(of_pressure, error.approach / factor_of_approach / approach) / scene.tolerance
@@ -278,7 +278,7 @@ def errors_over_allowed(
         allowed = min(allowed, max(ALLOWED_IN_HOLD * share, LEAST_SHARE * allowed))
     ratio = added_error(scene, pair, number, following, scales) / (allowed * scene.tolerance)
     if max(ratio, error.shared / force / (allowed * scene.tolerance)) <= 1:
-        row = 0.0  # the error is from before the pair
+        row = 0.0  # the pair adds little: the error is from before it
     return ratio, row
 
 
@@ -366,8 +366,8 @@ def relaxed_in_hold(scene: Scene, pair: Pair, number: int, following: float) -> 
 def rise_until(scene: Scene, number: int, point: Point, following: float) -> float:
     """Return the growth of the prescribed value until the next kept time, at least one."""
     until = min(following, scene.program.corners[number + 1])
-    now = scene.program.prescribed(number, point.time, point.start)
-    then = scene.program.prescribed(number, until, point.start)
+    now = scene.program.prescribed(number, point.time, point.segment_start)
+    then = scene.program.prescribed(number, until, point.segment_start)
     return max(then / now, 1.0) if now > 0 else 1.0
 
 

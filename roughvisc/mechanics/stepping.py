@@ -1,9 +1,10 @@
 """Time stepping: contact under a program of load or approach, on a viscoelastic body, with a stated error.
 
 :func:`march` proceeds by pairs of steps. The fine solution takes both steps. The coarse solution takes the pair as one
-step. Their difference gives the stated error (:mod:`roughvisc.mechanics.stated_error`), and its change over the pair
-controls the length of the next pair (:mod:`roughvisc.mechanics.step_control`). Kept times do not cut a pair: a row
-inside a pair is one more step, from the point before it (:func:`row_inside`).
+step, and continues from its own end: the difference of both is that of the whole run so far. It gives the stated error
+(:mod:`roughvisc.mechanics.stated_error`), and its change over the pair controls the length of the next pair
+(:mod:`roughvisc.mechanics.step_control`). A kept time inside a pair does not cut it: the row there is one more step,
+from the point before it (:func:`row_inside`).
 
 Errors are weighted by the part that relaxation leaves until the next kept time (:meth:`Memory.remaining`).
 
@@ -79,6 +80,8 @@ END_STEP = 1e-3
 class State:
     """State from which the time stepping can continue.
 
+    The state of a step inside a pair is the one before the pair, see :class:`Step`.
+
     Attributes
     ----------
     fine : Point
@@ -97,7 +100,7 @@ class State:
     kept_force, kept_approach : float
         Largest values of the yielded steps at kept times so far, this one included (:func:`with_largest_kept`). [N, m]
     solver_error : float
-        Largest relative error of the pressure due to the contact solver so far; within a pair, before the pair.
+        Largest relative error of the pressure due to the contact solver so far.
     work : float
         Work of the normal force since the start. [J]
     work_difference : float
@@ -267,7 +270,7 @@ def next_segment(scene: Scene, state: State) -> State:
     corner = scene.transitions[index - 1]
     load = fine.force
     if last.duration == 0 and not scene.can_jump:
-        value = scene.program.prescribed(state.segment, fine.time, fine.start)
+        value = scene.program.prescribed(state.segment, fine.time, fine.segment_start)
         if last.control == "load":
             load = value
         elif value != fine.approach:
@@ -280,7 +283,7 @@ def next_segment(scene: Scene, state: State) -> State:
     for point in (fine, state.coarse or fine):
         start = point.approach if following.control == "approach" else load if jumped else point.force
         is_late = jumped or (corner.is_abrupt and not point.is_open)
-        points.append(replace(without_past(point), start=start, is_late=is_late))
+        points.append(replace(without_past(point), segment_start=start, is_late=is_late))
     keeps_length = corner.is_smooth and not fine.is_open and scene.adhesion is None
     length = state.next_length if keeps_length else 0.0
     return replace(state, fine=points[0], coarse=points[1] if state.coarse else None, segment=index, next_length=length)
@@ -338,7 +341,7 @@ def step_on_path(scene: Scene, state: State, segment: Segment, event: float) -> 
     """Return a step of an elastic body with adhesion to an event at most [s]; the step of a jump is short."""
     fine = state.fine
     is_refused = False
-    longest = longest_step(scene, segment, fine.start)
+    longest = longest_step(scene, segment, fine.segment_start)
     length = min(state.next_length or longest, longest)
     shortest = JUMP * longest * (1 + ROUNDED)
     while True:
@@ -405,7 +408,8 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
     number = state.segment
     former = scene.program.segments[number - 1] if number > 0 else segment
     jumped = (former.duration == 0 or former.slide is not None) and not start.is_open
-    length = state.next_length or first_length(scene, segment, jumped)
+    is_first = state.next_length == 0
+    length = first_length(scene, segment, jumped) if is_first else state.next_length
     if segment.amplitude:
         length = min(length, segment.period / PAIRS_OF_A_CYCLE)
     controller = Controller(shortest_length(scene, number))
@@ -417,7 +421,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         state.peak,
     )
     while True:
-        middle, last = pair_ends(scene, number, start.time, length, is_first=not state.next_length)
+        middle, last = pair_ends(scene, number, start.time, length, is_first=is_first)
         # if no times are given, the end of each pair is a row
         times = (last,) if scene.kept is None else scene.kept_within(start.time, last)
         pair, at_end, coarse_at_end = solve_pair(scene, state, middle, last, has_row=bool(times))
@@ -489,7 +493,7 @@ def accepted(
     times : tuple of float
         Kept times of the pair. [s]
     error : StepErrors
-        Error of the pair at its end, without the errors before it.
+        Error at the end, from the difference of both solutions; and the shared error of the pair.
     next_length : float
         Length of the next pair. [s]
     """
@@ -573,7 +577,7 @@ def with_final_pressure(scene: Scene, before: Point, point: Point, number: int) 
     ahead = END_STEP * (point.time - before.time)
     value = point.force
     if scene.program.segments[number].control == "approach":
-        value = 2 * point.approach - scene.program.prescribed(number, point.time - ahead, point.start)
+        value = 2 * point.approach - scene.program.prescribed(number, point.time - ahead, point.segment_start)
     later = take_step(scene, without_past(point), point.time + ahead, number, value, rule="constant")
     return replace(later, time=point.time, approach=point.approach, previous=point.previous)
 
@@ -752,7 +756,7 @@ def take_step(
     area = scene.grid.cell_area
     segment = scene.program.segments[number]
     by_load = segment.control == "load"
-    value = scene.program.prescribed(number, time, here.start) if value is None else value
+    value = scene.program.prescribed(number, time, here.segment_start) if value is None else value
     prediction = memory.predict(here.history, step, "constant" if here.is_late else rule)
     alpha = prediction.compliance
     grid = prediction.grid or scene.grid
@@ -764,7 +768,7 @@ def take_step(
     if scene.adhesion is None and ((value == 0) if by_load else (value <= lowest)):
         nothing = grid.xp.zeros(gap.shape)
         history = memory.advance(here.history, prediction, nothing, nothing)
-        return Point(time, nothing, 0.0, lowest if by_load else value, history, previous, here.start)
+        return Point(time, nothing, 0.0, lowest if by_load else value, history, previous, here.segment_start)
     candidates = last_two(here, step) if candidates is None else candidates
     tolerance = max(solver_part * scene.tolerance, 1e-10)
     if scene.adhesion is not None:
@@ -812,7 +816,7 @@ def take_step(
         approach,
         history,
         previous,
-        here.start,
+        here.segment_start,
         solver_error=contact.error,
         solver_error_approach=contact.approach_error,
     )
@@ -824,16 +828,16 @@ def closing_time(scene: Scene, state: State, segment: Segment, event: float) -> 
     now = state.fine.time
     began = scene.program.corners[state.segment]
     if segment.control == "load":
-        return event if segment.highest(here.start) == 0 else now
+        return event if segment.highest(here.segment_start) == 0 else now
     # the profile would not even touch the undeformed surface, which is the highest
-    if segment.highest(here.start) <= float(scene.gap[scene.solid].min()):
+    if segment.highest(here.segment_start) <= float(scene.gap[scene.solid].min()):
         return event
 
     def last_open(left: float, right: float) -> float | None:
         """Return the last time between two times at which the surfaces are still apart; None if they stay apart."""
         surface = scene.gap + scene.memory.after_rest(here.history, right - now)
         level = float(surface[scene.solid].min())
-        ends = [scene.program.prescribed(state.segment, time, here.start) for time in (left, right)]
+        ends = [scene.program.prescribed(state.segment, time, here.segment_start) for time in (left, right)]
         if max(ends) <= level or (right - left <= shortest and ends[1] <= level):
             return None
         if right - left <= shortest:
