@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from references.half_space import punch_approach
 
 import roughvisc as rv
 from roughvisc.experiment.kept_times import spread_times
@@ -17,6 +18,19 @@ def test_histories__follow_the_closed_form():
     steps = rv.observables.history(ds)
     exact = rv.closed_forms.lee_radok(RADIUS, rubber, program).approach(steps.time.values[1:])
     assert (abs(steps.approach.values[1:] - exact) < 1e-3 * exact + 0.1 * (SIDE / CELLS) ** 2 / RADIUS).all()
+
+
+def test_errors_of_many_pairs__do_not_add_up_beyond_the_tolerance():
+    """The approach of a flat punch of cells is that of a round one, times a factor; under a load errors do not fade."""
+    times = np.linspace(0.0, 4.0, 201)
+    program = rv.Program.table(times, 0.5 * (1 - np.cos(0.9 * np.pi * times)) + 0.02 * times)
+    body = rv.Prony(1e-8, 0.0, (7e-8, 6e-8, 1e-6), (0.05, 0.25, 0.5))
+    punch, kept = rv.flat_punch(1.0, 2.6, 13), np.linspace(0.08, 4.0, 50)
+    ds = rv.simulate(punch, body, program, times=kept, tolerance=1e-3, progress=False, fields=())
+    at_once = rv.simulate(punch, rv.elastic(1.0), rv.Program().load(1.0, over=0), tolerance=1e-8, progress=False)
+    factor = float(at_once.approach[-1]) / (rv.elastic(1.0).contact_compliance(0.0) / 2)
+    exact = factor * punch_approach(1.0, body, program, kept)
+    assert (abs(ds.approach - exact) <= 1e-3 * np.maximum.accumulate(exact)).all()
 
 
 def test_fixed_step__is_the_longest():
