@@ -15,7 +15,7 @@ from roughvisc.mechanics.program import Program, instant
 Array = NDArray[np.float64]
 #: Times that differ by at most this many units in the last place are equal: rounding of sums and logarithms of times.
 _ROUNDING = 64
-#: Latest first kept time of a hold, as a part of the hold. [-]
+#: Start of the logarithmic spacing of kept times in a hold, as a part of the hold, at most. [-]
 _FIRST = 1e-3
 #: Relative numbers of kept times of a ramp or a slide, a hold, and a period of a cycle.
 _RAMP = 2.0

@@ -73,15 +73,22 @@ def both_ends(start: Point, end: Point, time: float) -> list[Candidate]:
     ]
 
 
-def around_coarse(end: Point, coarse: Point, fine: Point) -> list[Candidate]:
-    """Return the pressures for the coarse solution at the end of a step.
+def around_coarse(end: Point, coarse: Point, start: Point) -> list[Candidate]:
+    """Return the pressures for the first guess of the coarse solution at the end of a step.
 
-    They are the fine solution at the end, and both solutions before it; their weights add the difference of these two.
-    In a slide the pressure stays with the profile, so that all are in its frame.
+    They are those of the fine solution there, and of both solutions at the start; their weights add the difference at
+    the start. In a slide the pressure stays with the profile, so that all are in its frame.
+
+    Parameters
+    ----------
+    end, start : Point
+        Fine solution at the end and at the start.
+    coarse : Point
+        Coarse solution at the start.
     """
     points = [(end, 1.0)]
-    if coarse is not fine:
-        points += [(coarse, 1.0), (fine, -1.0)]
+    if coarse is not start:
+        points += [(coarse, 1.0), (start, -1.0)]
     return [Candidate(point.stored_pressure, point.history.fields[0], weight) for point, weight in points]
 
 

@@ -139,11 +139,12 @@ class Memory:
         self.weights: Any = np.append(self.compliances, self.glassy)
         #: Whether the response is independent of the history.
         self.is_elastic = not bool(self.compliances.any())
-        #: Rates at which errors of the history decay while the displacement is held [1/s], and their parts in an error
-        #: that is equal in all modes. The modes decay together, because ``glassy v = -sum_i c_i m_i``.
-        #: Then the parts of the relaxation function that relax at these rates.
+        #: Rates at which errors of the history decay while the displacement is held. The modes decay together, because
+        #: ``glassy v = -sum_i c_i m_i``. [1/s]
         self.rates = np.zeros(1)
+        #: Parts that decay at these rates of an error that is equal in all modes, not normalized.
         self.parts = np.ones(1)
+        #: Parts of the relaxation function that relax at these rates.
         self.relaxing = np.zeros(1)
         if self.glassy > 0 and not self.is_elastic:
             active = self.compliances > 0

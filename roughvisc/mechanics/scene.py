@@ -77,7 +77,7 @@ class Scene:
         Index of the cells with material.
     can_jump : bool
         Whether the body has an instantaneous compliance.
-    is_soft : bool
+    becomes_soft : bool
         Whether hardly any of the compliance at the end of the program is instantaneous.
     transitions : list of Corner
         Corner at the end of each segment.
@@ -96,14 +96,14 @@ class Scene:
     adhesion: Adhesion | None = None
     solid: Any = field(init=False)
     can_jump: bool = field(init=False)
-    is_soft: bool = field(init=False)
+    becomes_soft: bool = field(init=False)
     transitions: list[Corner] = field(init=False)
     motions: list[Slide | None] = field(init=False)
 
     def __post_init__(self) -> None:
         self.solid = ... if self.present is None else self.present
         self.can_jump = self.memory.compliance(0.0) > 0
-        self.is_soft = self.memory.grows(self.program.duration, SOFT)
+        self.becomes_soft = self.memory.grows(self.program.duration, SOFT)
         self.transitions = corners_of(self.program, self.can_jump)
         motion = None
         self.motions = []
@@ -203,7 +203,8 @@ class Point:
     history : History
         Memory of the body.
     previous : tuple or None
-        Time, stored pressure, and displacement per unit compliance of the last point, for the next first guess.
+        Time, stored pressure, and displacement per unit compliance of the last point: for the next first guess, and for
+        the length of the step.
     segment_start : float
         Force [N] or approach [m] at the start of the segment.
     is_late : bool

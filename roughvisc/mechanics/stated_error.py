@@ -41,9 +41,9 @@ LASTING = 0.5
 #: this part and the shared one, rows are up to 1.7 times beyond their stated error where a crest enters within a step
 #: (`test_entering_cells.py`).
 UNCERTAIN_OF_ENTERED = 0.3
-#: Error of this pressure that both solutions of a pair may share, as a part of the pressure times the square of the
-#: creep in the pair over the instantaneous compliance; at most the pressure itself. Measured on random contacts of
-#: 2 x 40 cells with eight per cent instantaneous compliance, and of 21 x 16 cells with four.
+#: Error of the pressure of entered cells that both solutions of a pair may share, as a part of the pressure times the
+#: square of the creep in the pair over the instantaneous compliance; at most the pressure itself. Measured on random
+#: contacts of 2 x 40 cells with eight per cent instantaneous compliance, and of 21 x 16 cells with four.
 SHARED = 0.1
 #: Pressure of a cell that may have entered the contact of a soft body, over the mean pressure.
 PRESSURE_OF_LATE = 2.5
@@ -75,7 +75,7 @@ class StepErrors:
         Error of the friction force of a slide. [N]
     shared : float
         Further error of the pressure, which the difference does not contain because both solutions share it: in cells
-        that have entered, and in slides by one cell. It is added to `pressure`. [N]
+        that have entered, and in slides by one cell. `pressure` does not contain it. [N]
     gap : float
         Error of the gap of a soft body. [m]
     """
@@ -94,7 +94,7 @@ class StepErrors:
     ) -> StepErrors:
         """Return the errors, each at least a part of the error before a pair; both shared errors add up.
 
-        The uncertain areas remain: they belong to an instant.
+        Uncertain areas before the pair do not count.
 
         Parameters
         ----------
@@ -105,7 +105,7 @@ class StepErrors:
         left_of_friction : float
             Part of the friction force that is left, see :func:`left_of_friction`.
         is_soft : bool
-            Whether hardly any of the compliance is instantaneous: the errors of pressure and force do not fade then.
+            Whether the pair is soft: the errors of pressure and force do not fade then.
         """
         lasting = LASTING if is_soft else LASTING * left
         return replace(
@@ -135,7 +135,7 @@ class StepErrors:
 
 def stated_over_difference(scene: Scene) -> tuple[float, float]:
     """Return the stated error over the difference of both solutions: of pressure and force, and of the approach."""
-    return STATED_SOFT if scene.is_soft else STATED
+    return STATED_SOFT if scene.becomes_soft else STATED
 
 
 def difference(
@@ -214,7 +214,7 @@ def uncertain_part(memory: Memory, step: float) -> float:
 
 
 def shared_part(memory: Memory, step: float) -> float:
-    """Return the error of this pressure that both solutions of a pair share, as a part of it; see `SHARED`."""
+    """Return the part of the pressure of a cell that has entered within a pair that is wrong in both solutions."""
     return min(SHARED * (memory.compliance(step) / memory.glassy - 1) ** 2, 1.0)
 
 
@@ -228,7 +228,7 @@ def with_former(
     *,
     is_soft: bool,
 ) -> StepErrors:
-    """Return the stated errors at a point of a pair, from those of the difference and those before the pair.
+    """Return the stated errors at a point of a pair, with those before the pair.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ def with_former(
     start, point : Point
         Fine solution before the pair, and at a point of the pair.
     error, former : StepErrors
-        Errors from the difference at the point, and stated errors before the pair.
+        Errors at the point without those before the pair, and stated errors before the pair.
     slide : Slide or None
         Motion, if the error of the friction force is needed.
     is_soft : bool
@@ -255,7 +255,7 @@ def stated_inside(
     scene: Scene,
     start: Point,
     point: Point,
-    at_end: StepErrors,
+    stated: StepErrors,
     former: StepErrors,
     slide: Slide | None,
     *,
@@ -263,12 +263,13 @@ def stated_inside(
 ) -> StepErrors:
     """Return the stated errors of a row inside a pair, where no coarse solution exists.
 
-    They are the larger ones of both ends of the pair, and the uncertain pressure of entered cells. At its end the
-    difference contains this pressure if the pair is soft; otherwise only the shared part counts there.
+    They are the larger ones of both ends of the pair, except the shared error: it is the uncertain pressure of entered
+    cells. At the end of the pair the difference contains this pressure if the pair is soft; otherwise only the shared
+    part counts there.
 
     Parameters
     ----------
-    at_end : StepErrors
+    stated : StepErrors
         Stated errors at the end of the pair.
     scene, start, point, former, slide, is_soft
         See :func:`with_former`.
@@ -280,8 +281,8 @@ def stated_inside(
     if entered:
         uncertain = uncertain_part(scene.memory, step) * entered
         uncertain = uncertain if is_soft else max(uncertain, shared_part(scene.memory, step) * entered)
-    error = replace(at_end.or_larger(former, left), shared=uncertain)
-    # adds the friction, and what is left of the former shared error
+    error = replace(stated.or_larger(former, left), shared=uncertain)
+    # changes only the friction, and the shared error: adds what is left of the former one
     return with_former(scene, start, point, error, former, slide, is_soft=is_soft)
 
 

@@ -231,7 +231,7 @@ def errors_over_allowed(
     """Return the error that a pair adds at the next kept time, over the allowed error, and the error at its end.
 
     If the pair has a kept row, its end counts as the next kept time. The error at the end is relative to the tolerance,
-    and zero if the end is not kept or the pair may not be repeated for it. Errors are relative to the largest force and
+    and zero if the end is not kept, or the pair is short or adds little. Errors are relative to the largest force and
     approach of the kept rows, of the pair, and of the next row as far as it is known. While the approach is held, they
     are relative to the largest force of the kept rows and the force that relaxation leaves until the next one.
 
@@ -258,28 +258,29 @@ def errors_over_allowed(
     least = least_approach(scene, second.time, force)
     approach = max(largest.approach, abs(pair.first.approach), abs(second.approach), least)
 
-    row = 0.0
+    at_row = 0.0
     factor, factor_of_approach = stated_over_difference(scene)
     # a pair that is short for its place in the segment is not repeated: see FIRST_PAIR
     if scene.keeps(second.time) and taken > FIRST_PAIR * (second.time - scene.program.corners[number]):
-        # the whole difference, or the stated error with the shared one, whichever is larger
+        # The whole difference, of which the rows state a part: the rest of the tolerance is for the errors of solver
+        # and series. Or the stated error with the shared one, if that is larger.
         of_pressure = max(error.pressure / factor, error.pressure + shared) / force
-        row = max(of_pressure, error.approach / factor_of_approach / approach) / scene.tolerance
+        at_row = max(of_pressure, error.approach / factor_of_approach / approach) / scene.tolerance
 
     following = second.time if has_row else min(scene.next_kept(second.time), scene.program.duration)
     rise = rise_until(scene, number, second, following)
     expected = 0.0 if has_row else force_ahead(scene, pair, following, largest)
     # under a load the approach grows at least as the root of the load: a cone
     scales = max(force, second.size * rise, expected), max(approach, abs(second.approach) * rise**0.5)
-    allowed = ALLOWED_SOFT if scene.is_soft else ALLOWED
+    allowed = ALLOWED_SOFT if scene.becomes_soft else ALLOWED
     left, share = relaxed_in_hold(scene, pair, number, following)
     if share < 1:
         scales = max(largest.force, second.size * left, scene.least_force), scales[1]
         allowed = min(allowed, max(ALLOWED_IN_HOLD * share, LEAST_SHARE * allowed))
     ratio = added_error(scene, pair, number, following, scales) / (allowed * scene.tolerance)
     if max(ratio, error.shared / force / (allowed * scene.tolerance)) <= 1:
-        row = 0.0  # the pair adds little: the error is from before it
-    return ratio, row
+        at_row = 0.0  # the pair adds little: the error is from before it
+    return ratio, at_row
 
 
 def least_approach(scene: Scene, time: float, force: float) -> float:
@@ -375,9 +376,9 @@ def added_error(scene: Scene, pair: Pair, number: int, following: float, scales:
     """Return the error that a pair adds at the next kept time: of pressure, approach, and displaced surface.
 
     The error is the change of the difference between both solutions over the pair, from its value before the pair or
-    from the part that relaxation leaves of this value. The errors of pairs add up: if the error stated for what is left
-    of the difference before the pair exceeds the tolerance, the error of the pair counts as many times, at most
-    `REJECTED` times.
+    from the part that relaxation leaves of this value, whichever is smaller. The errors of pairs add up: if the error
+    stated for what is left of the difference before the pair exceeds the tolerance, the error of the pair counts as
+    many times, at most `REJECTED` times.
 
     Parameters
     ----------
@@ -396,14 +397,14 @@ def added_error(scene: Scene, pair: Pair, number: int, following: float, scales:
     is_soft = pair.is_soft
     by_load = scene.program.segments[number].control == "load"
     receding = pair.receding()
-    at_end = second.pressure - coarse_end.pressure
-    at_start = pair.start.pressure - pair.coarse_start.pressure
-    change = float(abs(at_end - at_start).sum())
+    difference = second.pressure - coarse_end.pressure
+    former = pair.start.pressure - pair.coarse_start.pressure
+    change = float(abs(difference - former).sum())
     if is_soft:
         remains = memory.compliance(taken) / memory.compliance(following - second.time + taken)
         remains = 1.0 if receding else remains
     else:
-        change = min(change, float(abs(at_end - memory.remaining(taken) * at_start).sum()))
+        change = min(change, float(abs(difference - memory.remaining(taken) * former).sum()))
         ahead = following - second.time
         left = 1.0
         if not by_load:  # the error arises about the middle of the pair, and has relaxed since: count from there
@@ -411,12 +412,12 @@ def added_error(scene: Scene, pair: Pair, number: int, following: float, scales:
             left = memory.remaining(taken / 2)
         remains = max(memory.remaining(ahead) / left if left > 0 else 0.0, LEAST_REMAINING)
     error = change * scene.grid.cell_area / scales[0] * remains
-    before = factor * float(abs(at_start).sum()) * scene.grid.cell_area / scales[0] * remains
+    before = factor * float(abs(former).sum()) * scene.grid.cell_area / scales[0] * remains
     before *= 1.0 if is_soft else memory.remaining(taken)
     if by_load:
-        approach_at_start = pair.start.approach - pair.coarse_start.approach
-        error = max(error, abs(second.approach - coarse_end.approach - approach_at_start) / scales[1])
-        before = max(before, factor_of_approach * abs(approach_at_start) / scales[1])
+        former_of_approach = pair.start.approach - pair.coarse_start.approach
+        error = max(error, abs(second.approach - coarse_end.approach - former_of_approach) / scales[1])
+        before = max(before, factor_of_approach * abs(former_of_approach) / scales[1])
     if not by_load or second.is_open or is_soft:
         surface = memory.displacement(second.history)[0] - memory.displacement(coarse_end.history)[0]
         surface -= memory.displacement(pair.start.history)[0] - memory.displacement(pair.coarse_start.history)[0]

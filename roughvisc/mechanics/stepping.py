@@ -223,7 +223,7 @@ def march(scene: Scene, state: State | None = None) -> Iterator[Step]:
         follows_from_jump = jumps_next and (scene.can_jump or is_jump)
         if follows_from_jump or (is_jump and not (scene.can_jump or is_start)):
             steps.pop()
-        # no step changes kept_force and kept_approach: the state has the values before the steps
+        # steps do not change kept_force and kept_approach: the new state still has the values before them
         steps = with_largest_kept(scene, state, steps)
         if steps:
             last = steps[-1].state
@@ -433,8 +433,8 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         if scene.time_step is not None:
             next_length = length
             break
-        shared = error.shared + state.errors.shared * scene.memory.remaining(pair.length)
-        ratio, at_row = errors_over_allowed(scene, pair, number, error, shared, largest, has_row=bool(times))
+        shared_so_far = error.shared + state.errors.shared * scene.memory.remaining(pair.length)
+        ratio, at_row = errors_over_allowed(scene, pair, number, error, shared_so_far, largest, has_row=bool(times))
         loses_contact = not start.is_open and (pair.first.is_open or pair.second.is_open)
         opens = not by_load and loses_contact and pair.second.approach >= start.approach
         again, proposed = controller.judge(pair.length, ratio, at_row, opens=opens)

@@ -172,7 +172,7 @@ def solve_contact(
     cells = grid.xp.flatnonzero(pressure)
     touching = cells.size  # number of cells in contact
     previous: Last | None = None
-    requested_size = requested_duality = math.nan  # L1 norm of the last requested change, duality gap then
+    requested_size = requested_duality = math.nan  # L1 norm of the last preconditioned residual, duality gap then
     length = 1.0
     error = best = math.inf
     stalled = 0
