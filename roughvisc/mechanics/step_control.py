@@ -24,10 +24,10 @@ FIRST_PAIR = 0.01
 #: Growth of the compliance in the first pair after a jump. In a longer pair the pressure would relax far within a step,
 #: and both solutions would share an error of the slow exponentials: `closed_forms.py cells-one waves`, bad rows.
 RESOLVED = 1.5
-#: Part of the tolerance that a pair may add to the error: usually, and for bodies with hardly any instantaneous
-#: compliance. With ALLOWED_SOFT = 0.4 one in eight cases of such bodies has a row beyond the tolerance. With 0.2 a
-#: third to a half of these cases are within it, for 1.1 times the convolutions; with 0.1 three in five, for 1.26 times
-#: (`accuracy.py`).
+#: Part of the tolerance that a pair may add to the difference of both solutions: usually, and for bodies with hardly
+#: any instantaneous compliance. With ALLOWED_SOFT = 0.4 one in eight cases of such bodies has a row beyond the
+#: tolerance. With 0.2 a third to a half of these cases are within it, for 1.1 times the convolutions; with 0.1 three in
+#: five, for 1.26 times (`accuracy.py`).
 ALLOWED = 0.25
 ALLOWED_SOFT = 0.17
 #: While the approach is held, the force relaxes as errors do, so that the errors of all pairs add up. All pairs until
@@ -165,7 +165,8 @@ class Controller:
             if misses:
                 return replace(again, refused_at_row=at_row), 0.5 * taken
         largest = LARGEST_GROWTH / (1 + SLACK)
-        if self.refused <= ratio:  # the error does not depend on the length, and the next pair need not be as short
+        # the error does not depend on the length, and the next pair need not be as short, except for a row
+        if self.refused <= ratio and self.refused_at_row == math.inf:
             return None, min(self.tried, largest * taken)
         if self.refused < math.inf:  # after a refused trial steps do not grow (Hairer, Norsett, Wanner I, section II.4)
             largest = 1.0
@@ -223,7 +224,7 @@ def errors_over_allowed(
     pair: Pair,
     number: int,
     error: StepErrors,
-    shared: float,
+    shared_so_far: float,
     largest: Largest,
     *,
     has_row: bool,
@@ -245,7 +246,7 @@ def errors_over_allowed(
         Index of the segment.
     error : StepErrors
         Error at the end of the pair, from the difference of both solutions.
-    shared : float
+    shared_so_far : float
         Error of the pressure that both solutions share, what is left from before the pair included. [N]
     largest : Largest
         Forces and approaches until the pair.
@@ -264,8 +265,10 @@ def errors_over_allowed(
     if scene.keeps(second.time) and taken > FIRST_PAIR * (second.time - scene.program.corners[number]):
         # The whole difference, of which the rows state a part: the rest of the tolerance is for the errors of solver
         # and series. Or the stated error with the shared one, if that is larger.
-        of_pressure = max(error.pressure / factor, error.pressure + shared) / force
-        at_row = max(of_pressure, error.approach / factor_of_approach / approach) / scene.tolerance
+        force_at_end = max(largest.force, second.size, scene.least_force)
+        approach_at_end = max(largest.approach, abs(second.approach), least)
+        of_pressure = max(error.pressure / factor, error.pressure + shared_so_far) / force_at_end
+        at_row = max(of_pressure, error.approach / factor_of_approach / approach_at_end) / scene.tolerance
 
     following = second.time if has_row else min(scene.next_kept(second.time), scene.program.duration)
     rise = rise_until(scene, number, second, following)

@@ -534,9 +534,14 @@ def accepted(
     of_work = max(state.work_difference, after.work_difference, key=abs)
     for point, work in zip(inside, works[:-1], strict=True):
         between = stated_inside(scene, start, point, stated, state.errors, slide, is_soft=pair.is_soft)
-        curved = math.hypot(state.work_curved, first_error if point.time <= pair.first.time else last_error)
+        is_late = point.time > pair.first.time
         within = replace(
-            state, work=state.work + work, work_curved=curved, work_difference=of_work, work_relaxed=after.work_relaxed
+            state,
+            solver_error=max(state.solver_error, pair.first.solver_error if is_late else 0.0),
+            work=state.work + work,
+            work_curved=math.hypot(state.work_curved, last_error if is_late else first_error),
+            work_difference=of_work,
+            work_relaxed=after.work_relaxed,
         )
         steps.append(Step(point, with_late_entry(between, point), number, within, is_end=False))
     return [*steps, Step(at_end, with_late_entry(stated, at_end), number, after)]

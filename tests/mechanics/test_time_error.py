@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
-from support import at_rows, relative_errors
+from support import at_rows, relative_errors, scene
 
 import roughvisc as rv
 from roughvisc.mechanics import stepping
+from roughvisc.mechanics.step_control import Controller
+from roughvisc.mechanics.stepping import march
 
 TOLERANCE, SHARPER = 1e-2, 30
 MATERIALS = {
@@ -104,3 +106,26 @@ def test_material_that_relaxes_at_once__takes_the_steps_of_an_elastic_one(progra
     assert quick.roughvisc.steps.sizes["step"] <= 4 * limit.roughvisc.steps.sizes["step"]
     for name in ("force", "approach"):
         np.testing.assert_allclose(quick[name], limit[name], rtol=0, atol=1e-3 * float(limit[name].max()))
+
+
+def test_row_in_the_second_half_of_a_pair__states_the_solver_error_of_the_first():
+    """It continues from the first step of the pair."""
+    program = rv.Program().load(0.03, over=0.5).hold(1.0)
+    times = tuple(np.linspace(0.01, 1.5, 150).tolist())
+    pair, began, counted = [], 0.0, 0
+    for step in march(scene(MATERIALS["zener"], program, times=times)):
+        pair.append(step)
+        if step.is_end:
+            middle = min(pair, key=lambda one: abs(2 * one.point.time - began - step.point.time))
+            later = [one for one in pair[:-1] if one.point.time > middle.point.time]
+            assert all(one.state.solver_error >= middle.point.solver_error for one in later)
+            pair, began, counted = [], step.point.time, counted + len(later)
+    assert counted > 5
+
+
+def test_pair_that_is_refused_for_its_row__is_not_tried_again_at_its_length():
+    """If its half adds no less, the next pair is no longer than this half: otherwise nobody would judge the row."""
+    again, half = Controller(shortest=0.0).judge(1.0, ratio=0.9, at_row=2.0, opens=False)
+    accepted, following = again.judge(half, ratio=0.95, at_row=0.0, opens=False)
+    assert accepted is None
+    assert following <= half < 1.0

@@ -156,8 +156,8 @@ def line_search(
 ) -> tuple[float, float, float]:
     """Return the curvature of the energy along a trial, its fraction at the minimum, and the fraction to take.
 
-    A trial that empties cells is taken whole if the energy decreases up to its end, so that these cells leave the
-    contact. A longer step ends where the pressure of a cell becomes zero.
+    A trial that empties cells is taken whole if the energy is lower at its end, so that these cells leave the contact.
+    A longer step ends where the pressure of a cell becomes zero.
 
     Parameters
     ----------

@@ -18,8 +18,8 @@ The method is constrained conjugate gradients on an evolving contact area [1]_. 
 7. Under periodic boundaries a uniform pressure does not displace a half-space. A given approach therefore needs a
    separate check of the load near full contact.
 
-Vectors hold the values of the *free* cells, which carry pressure or penetrate. All pressures and lengths are divided by
-one pressure, so that loads of 1e-300 are solved like any others.
+Vectors of an iteration hold the values of the *free* cells, which carry pressure or penetrate. All pressures and
+lengths are divided by one pressure, so that loads of 1e-300 are solved like any others.
 
 .. [1] I. A. Polonsky, L. M. Keer, Wear 231 (1999) 206.
 """
@@ -166,7 +166,7 @@ def solve_contact(
     pressure, separation = problem.first_guess(start, start_displacement)
 
     under_load = problem.under_load
-    is_given = start_displacement is not None
+    rests_on_guess = start_displacement is not None  # until the first trial, whose displacement is computed
     has_blocks = min(gap.shape) >= BLOCKS_FROM  # the preconditioner may have a second level
     on_grid = passes.Scatter(grid.xp.zeros(gap.shape))
     cells = grid.xp.flatnonzero(pressure)
@@ -190,9 +190,11 @@ def solve_contact(
         touching = free.touching
         duality = duality_gap(free, under_load)
         rounding = duality_rounding(grid, free)
-        if free.largest_residual == 0 and is_given:  # as with a single cell: no step would correct the displacement
+        if (
+            free.largest_residual == 0 and rests_on_guess
+        ):  # as with a single cell: no step would correct the displacement
             separation = problem.separation_under(pressure)
-            is_given = False
+            rests_on_guess = False
             continue
 
         # The error estimate is the last requested change of pressure, scaled by the decrease of the duality gap since.
@@ -222,7 +224,7 @@ def solve_contact(
         # The preconditioned residual estimates the present error without another convolution. It does not count before
         # the first step, because the displacement of a first guess is not accurate enough.
         estimate = requested_size / max(free.total, 1e-300)
-        if not is_given and is_solved(free, estimate, tolerance, duality, rounding):
+        if not rests_on_guess and is_solved(free, estimate, tolerance, duality, rounding):
             estimate += load_error(problem, pressure, separation, free)
             if estimate <= tolerance:
                 error = estimate
@@ -249,7 +251,7 @@ def solve_contact(
             break
 
         # Minimize the energy along the search direction, equation (11): one convolution.
-        if is_given:  # replaces the displacement of the first guess, so that rounding errors do not accumulate
+        if rests_on_guess:  # replaces the displacement of the first guess, so that rounding errors do not accumulate
             response = grid.displacement(on_grid(trial, cells)).reshape(-1)
             response -= separation
             response += problem.gap
@@ -257,9 +259,9 @@ def solve_contact(
             response = grid.displacement(on_grid(change, cells)).reshape(-1)
         curvature, minimum, fraction = passes.line_search(free.held, trial, change, slope, response, cells)
         longest = GROW_AFTER_CUT if fraction < minimum else GROW
-        if is_given:  # take the whole step: the displacement is known exactly only for its end
+        if rests_on_guess:  # take the whole step: the displacement is known exactly only for its end
             fraction = 1.0
-            is_given = False
+            rests_on_guess = False
             curvature = curvature if abs(minimum - 1) < NEARLY_MINIMUM else 0.0
         passes.advance(pressure, separation, cells, (free.held, trial, change), response, fraction)
         previous = (cells, change, response, curvature) if curvature > 0 else None
