@@ -126,7 +126,7 @@ class StepErrors:
         other : StepErrors
             Other errors.
         left : float
-            Part of them that relaxation leaves; uncertain areas and the errors of approach and gap do not fade.
+            Part that relaxation leaves of the other errors. Areas and the errors of approach and gap do not fade.
         """
         parts = {name: error * left for name, error in vars(other).items()}
         parts |= {name: getattr(other, name) for name in ("approach", "gap", "inside", "outside")}
@@ -282,7 +282,7 @@ def stated_inside(
         uncertain = uncertain_part(scene.memory, step) * entered
         uncertain = uncertain if is_soft else max(uncertain, shared_part(scene.memory, step) * entered)
     error = replace(stated.or_larger(former, left), shared=uncertain)
-    # changes only the friction, and the shared error: adds what is left of the former one
+    # changes only the friction, and adds the remaining former shared error
     return with_former(scene, start, point, error, former, slide, is_soft=is_soft)
 
 

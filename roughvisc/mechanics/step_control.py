@@ -247,7 +247,7 @@ def errors_over_allowed(
     error : StepErrors
         Error at the end of the pair, from the difference of both solutions.
     shared_so_far : float
-        Error of the pressure that both solutions share, what is left from before the pair included. [N]
+        Error of the pressure that both solutions share, with the remaining error from before the pair. [N]
     largest : Largest
         Forces and approaches until the pair.
     has_row : bool
@@ -380,8 +380,8 @@ def added_error(scene: Scene, pair: Pair, number: int, following: float, scales:
 
     The error is the change of the difference between both solutions over the pair, from its value before the pair or
     from the part that relaxation leaves of this value, whichever is smaller. The errors of pairs add up: if the error
-    stated for what is left of the difference before the pair exceeds the tolerance, the error of the pair counts as
-    many times, at most `REJECTED` times.
+    that would be stated for the remaining difference from before the pair exceeds the tolerance, the error of the pair
+    counts as many times, at most `REJECTED` times.
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
 """Time stepping: contact under a program of load or approach, on a viscoelastic body, with a stated error.
 
 :func:`march` proceeds by pairs of steps. The fine solution takes both steps. The coarse solution takes the pair as one
-step, and continues from its own end: the difference of both is that of the whole run so far. It gives the stated error
-(:mod:`roughvisc.mechanics.stated_error`), and its change over the pair controls the length of the next pair
-(:mod:`roughvisc.mechanics.step_control`). A kept time inside a pair does not cut it: the row there is one more step,
-from the point before it (:func:`row_inside`).
+step, and continues from its own end: the difference of both solutions comes from the whole run so far. It gives the
+stated error (:mod:`roughvisc.mechanics.stated_error`), and its change over the pair controls the length of the next
+pair (:mod:`roughvisc.mechanics.step_control`). A kept time inside a pair does not cut it: the row there is one more
+step, from the point before it (:func:`row_inside`).
 
 Errors are weighted by the part that relaxation leaves until the next kept time (:meth:`Memory.remaining`).
 
