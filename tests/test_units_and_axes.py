@@ -86,12 +86,13 @@ FIRST = Frame()
 OTHERS = (Frame(2.0**10, 2.0**10, 2.0**-10), Frame(2.0**-30, 2.0**40, 2.0**10, is_turned=True))
 
 
-def assert_same(found, expected, frame, but=()):
+def assert_same(found, expected, frame, but=(), stops_alike=True):
     """Compare all columns; a column that takes one side, or one unit, for another one differs."""
     assert found.variables.keys() == expected.variables.keys()
     for name in set(expected.variables) - {"x", "y", "wall_time", "convolutions", *but}:
         wanted = expected[name].values
-        part = 0.25 if name == "residual" else 1e-3  # by rounding the solver may stop one iteration earlier
+        # by rounding the solver may stop one iteration earlier, and stated errors contain its error
+        part = 0.25 if name == "residual" or (name.endswith("_error") and not stops_alike) else 1e-3
         precision = part * np.abs(wanted).max(initial=1e-300, where=np.isfinite(wanted))
         np.testing.assert_allclose(frame.result(found[name]), wanted, rtol=0, atol=precision, err_msg=name)
 
@@ -138,8 +139,10 @@ def test_rows_and_steps_of_a_program__are_neutral_to_units_and_axes(name):
 
     expected = pressed(FIRST)
     for frame in OTHERS:
-        for found, wanted in zip(pressed(frame), expected, strict=True):
-            assert_same(found, wanted, frame)
+        results = pressed(frame)
+        stops_alike = np.allclose(results[1].residual, expected[1].residual, rtol=1e-3)
+        for found, wanted in zip(results, expected, strict=True):
+            assert_same(found, wanted, frame, stops_alike=stops_alike)
 
 
 @pytest.mark.parametrize("body", [Frame.zener, Frame.sheet, Frame.layers])

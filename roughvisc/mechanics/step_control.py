@@ -165,9 +165,8 @@ class Controller:
             if misses:
                 return replace(again, refused_at_row=at_row), 0.5 * taken
         largest = LARGEST_GROWTH / (1 + SLACK)
-        # the error does not depend on the length, and the next pair need not be as short, except for a row
-        if self.refused <= ratio and self.refused_at_row == math.inf:
-            return None, min(self.tried, largest * taken)
+        if self.refused <= ratio:  # the error does not depend on the length, and the next pair need not be as short
+            return None, min(self.tried, largest * taken) if self.refused_at_row == math.inf else taken
         if self.refused < math.inf:  # after a refused trial steps do not grow (Hairer, Norsett, Wanner I, section II.4)
             largest = 1.0
         return None, taken * min(max(factor, SHRINK), largest)
@@ -280,6 +279,8 @@ def errors_over_allowed(
     if share < 1:
         scales = max(largest.force, second.size * left, scene.least_force), scales[1]
         allowed = min(allowed, max(ALLOWED_IN_HOLD * share, LEAST_SHARE * allowed))
+    # smaller forces, after surfaces have touched again, are not resolved: former errors are as large
+    scales = max(scales[0], scene.tolerance * largest.of_all), scales[1]
     ratio = added_error(scene, pair, number, following, scales) / (allowed * scene.tolerance)
     if max(ratio, error.shared / force / (allowed * scene.tolerance)) <= 1:
         at_row = 0.0  # the pair adds little: the error is from before it
@@ -379,8 +380,8 @@ def added_error(scene: Scene, pair: Pair, number: int, following: float, scales:
     """Return the error that a pair adds at the next kept time: of pressure, approach, and displaced surface.
 
     The error is the change of the difference between both solutions over the pair, from its value before the pair or
-    from the part that relaxation leaves of this value, whichever is smaller. The errors of pairs add up: if the error
-    that would be stated for the remaining difference from before the pair exceeds the tolerance, the error of the pair
+    from the part that relaxation leaves of this value, whichever is smaller. Errors of the approach under a load do not
+    fade, and those of pairs add up: if the error stated before the pair exceeds the tolerance, the error of the pair
     counts as many times, at most `REJECTED` times.
 
     Parameters
@@ -393,7 +394,7 @@ def added_error(scene: Scene, pair: Pair, number: int, following: float, scales:
         Force and approach to which errors are relative. [N, m]
     """
     memory = scene.memory
-    factor, factor_of_approach = stated_over_difference(scene)
+    factor_of_approach = stated_over_difference(scene)[1]
     second = pair.second
     coarse_end = pair.coarse_end
     taken = pair.length
@@ -415,14 +416,13 @@ def added_error(scene: Scene, pair: Pair, number: int, following: float, scales:
             left = memory.remaining(taken / 2)
         remains = max(memory.remaining(ahead) / left if left > 0 else 0.0, LEAST_REMAINING)
     error = change * scene.grid.cell_area / scales[0] * remains
-    before = factor * float(abs(former).sum()) * scene.grid.cell_area / scales[0] * remains
-    before *= 1.0 if is_soft else memory.remaining(taken)
     if by_load:
         former_of_approach = pair.start.approach - pair.coarse_start.approach
-        error = max(error, abs(second.approach - coarse_end.approach - former_of_approach) / scales[1])
-        before = max(before, factor_of_approach * abs(former_of_approach) / scales[1])
+        of_approach = abs(second.approach - coarse_end.approach - former_of_approach) / scales[1]
+        before = factor_of_approach * abs(former_of_approach) / scales[1]
+        error = max(error, of_approach * min(max(before / scene.tolerance, 1.0), REJECTED))
     if not by_load or second.is_open or is_soft:
         surface = memory.displacement(second.history)[0] - memory.displacement(coarse_end.history)[0]
         surface -= memory.displacement(pair.start.history)[0] - memory.displacement(pair.coarse_start.history)[0]
         error = max(error, float(abs(surface).max()) / scales[1] * (1.0 if is_soft or receding else remains))
-    return error * min(max(before / scene.tolerance, 1.0), REJECTED)
+    return error
