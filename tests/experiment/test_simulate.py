@@ -48,8 +48,9 @@ def test_analytic_profile__grows_and_ends_as_on_a_large_grid():
     assert grown.approach.values == pytest.approx(exact.approach.values, rel=3e-3)
     x, y = ((exact.sizes[axis] - grown.sizes[axis]) // 2 for axis in ("x", "y"))
     inside = exact.isel(x=slice(x, x + grown.sizes["x"]), y=slice(y, y + grown.sizes["y"]))
-    for name in ("height", "pressure", "displacement"):
-        assert np.abs(grown[name].values - inside[name].values).max() < 2e-2 * float(abs(exact[name]).max())
+    for name in ("height", "pressure", "displacement"):  # a cell at the edge may have just entered in one of them
+        off = np.abs(grown[name].values - inside[name].values).sum((-2, -1))
+        assert (off <= 1e-3 * abs(exact[name]).sum(("x", "y")).values).all()
     assert "grown from" in grown.attrs["history"]
 
 
