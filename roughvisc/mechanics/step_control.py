@@ -125,7 +125,7 @@ class Controller:
     Attributes
     ----------
     shortest : float
-        Pairs that are not longer are accepted. [s]
+        Pairs that are not longer are accepted, and no shorter one follows. [s]
     refused : float
         Added error of the last refused trial of this pair, over the allowed error.
     refused_at_row : float
@@ -166,10 +166,11 @@ class Controller:
                 return replace(again, refused_at_row=at_row), 0.5 * taken
         largest = LARGEST_GROWTH / (1 + SLACK)
         if self.refused <= ratio:  # the error does not depend on the length, and the next pair need not be as short
-            return None, min(self.tried, largest * taken) if self.refused_at_row == math.inf else taken
+            following = min(self.tried, largest * taken) if self.refused_at_row == math.inf else taken
+            return None, max(following, self.shortest)
         if self.refused < math.inf:  # after a refused trial steps do not grow (Hairer, Norsett, Wanner I, section II.4)
             largest = 1.0
-        return None, taken * min(max(factor, SHRINK), largest)
+        return None, max(taken * min(max(factor, SHRINK), largest), self.shortest)
 
 
 def first_length(scene: Scene, segment: Segment, jumped: bool) -> float:

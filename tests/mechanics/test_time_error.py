@@ -129,3 +129,12 @@ def test_pair_that_is_refused_for_its_row__is_not_tried_again_at_its_length():
     accepted, following = again.judge(half, ratio=0.95, at_row=0.0, opens=False)
     assert accepted is None
     assert following <= half < 1.0
+
+
+def test_pairs__do_not_become_ever_shorter():
+    """An error that no length reduces, twice the allowed one, does not stop the time."""
+    length = 1.0
+    for _ in range(100):
+        controller, length = Controller(shortest=1e-3).judge(length, ratio=2.0, at_row=0.0, opens=False)
+        assert controller is None
+    assert length == 1e-3
