@@ -142,7 +142,7 @@ class Memory:
         #: Rates at which errors of the history decay while the displacement is held. The modes decay together, because
         #: ``glassy v = -sum_i c_i m_i``. [1/s]
         self.rates = np.zeros(1)
-        #: Parts that decay at these rates of an error that is equal in all modes, not normalized.
+        #: Parts, not normalized, of an error that is equal in all modes: each decays at one of these rates.
         self.parts = np.ones(1)
         #: Parts of the relaxation function that relax at these rates.
         self.relaxing = np.zeros(1)

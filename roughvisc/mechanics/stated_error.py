@@ -214,7 +214,7 @@ def uncertain_part(memory: Memory, step: float) -> float:
 
 
 def shared_part(memory: Memory, step: float) -> float:
-    """Return the part of the pressure of a cell that has entered within a pair that is wrong in both solutions."""
+    """Return the relative error that both solutions share in the pressure of a cell that has entered within a pair."""
     return min(SHARED * (memory.compliance(step) / memory.glassy - 1) ** 2, 1.0)
 
 
@@ -228,7 +228,7 @@ def with_former(
     *,
     is_soft: bool,
 ) -> StepErrors:
-    """Return the stated errors at a point of a pair, with those before the pair.
+    """Return the stated errors at a point of a pair, and include the errors from before the pair.
 
     Parameters
     ----------

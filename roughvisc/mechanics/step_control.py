@@ -17,9 +17,9 @@ from roughvisc.mechanics.program import Segment
 from roughvisc.mechanics.scene import Point, Scene
 from roughvisc.mechanics.stated_error import StepErrors, stated_over_difference
 
-#: Length of the first pair after a corner that is not smooth, as a part of the segment: contact changes fast. Also the
-#: shortest pair that is repeated in halves because it misses the tolerance at a kept time, as a part of the time since
-#: the segment began. With 0.005: 1.02, 0.99, 1.01; with 0.02: 1.07, 1.03, 1.10.
+#: Length of the first pair after a corner that is not smooth, as a part of the segment: contact changes fast there.
+#: Also the shortest pair that is repeated in halves because it misses the tolerance at a kept time, as a part of the
+#: time since the segment began. With 0.005: 1.02, 0.99, 1.01; with 0.02: 1.07, 1.03, 1.10.
 FIRST_PAIR = 0.01
 #: Growth of the compliance in the first pair after a jump. In a longer pair the pressure would relax far within a step,
 #: and both solutions would share an error of the slow exponentials: `closed_forms.py cells-one waves`, bad rows.
@@ -234,7 +234,8 @@ def errors_over_allowed(
     If the pair has a kept row, its end counts as the next kept time. The error at the end is relative to the tolerance,
     and zero if the end is not kept, or the pair is short or adds little. Errors are relative to the largest force and
     approach of the kept rows, of the pair, and of the next row as far as it is known. While the approach is held, they
-    are relative to the largest force of the kept rows and the force that relaxation leaves until the next one.
+    are relative to the largest force of the kept rows and the force that relaxation leaves until the next one. The
+    force is at least the tolerance times the largest force of all steps.
 
     Parameters
     ----------
@@ -263,8 +264,8 @@ def errors_over_allowed(
     factor, factor_of_approach = stated_over_difference(scene)
     # a pair that is short for its place in the segment is not repeated: see FIRST_PAIR
     if scene.keeps(second.time) and taken > FIRST_PAIR * (second.time - scene.program.corners[number]):
-        # The whole difference, of which the rows state a part: the rest of the tolerance is for the errors of solver
-        # and series. Or the stated error with the shared one, if that is larger.
+        # The rows state only a part of the difference. The whole difference is compared with the tolerance, because
+        # rows also state the errors of solver and series. The stated error with the shared one may be larger.
         force_at_end = max(largest.force, second.size, scene.least_force)
         approach_at_end = max(largest.approach, abs(second.approach), least)
         of_pressure = max(error.pressure / factor, error.pressure + shared_so_far) / force_at_end
@@ -280,7 +281,7 @@ def errors_over_allowed(
     if share < 1:
         scales = max(largest.force, second.size * left, scene.least_force), scales[1]
         allowed = min(allowed, max(ALLOWED_IN_HOLD * share, LEAST_SHARE * allowed))
-    # smaller forces, after surfaces have touched again, are not resolved: former errors are as large
+    # When surfaces have just touched again, the force is smaller than the errors from before: do not resolve it.
     scales = max(scales[0], scene.tolerance * largest.of_all), scales[1]
     ratio = added_error(scene, pair, number, following, scales) / (allowed * scene.tolerance)
     if max(ratio, error.shared / force / (allowed * scene.tolerance)) <= 1:

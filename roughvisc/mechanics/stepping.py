@@ -80,7 +80,7 @@ END_STEP = 1e-3
 class State:
     """State from which the time stepping can continue.
 
-    The state of a step inside a pair is the one before the pair, see :class:`Step`.
+    The state of a step inside a pair is mostly that before the pair, see :class:`Step`.
 
     Attributes
     ----------
@@ -156,7 +156,7 @@ class Step(NamedTuple):
         Index of the segment that the step belongs to.
     state : State
         State after the step, from which a march continues. In the middle of a pair it is the state before the pair,
-        with the work and its errors, the path, and the largest kept values of the step.
+        with the work and its errors, the path, the error of the solver, and the largest kept values of the step.
     is_end : bool
         Whether a march may continue from the state; False in the middle of a pair.
     """
@@ -427,8 +427,8 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         pair, at_end, coarse_at_end = solve_pair(scene, state, middle, last, has_row=bool(times))
         slide = scene.motions[number] if times else None
         error = difference(scene, start, at_end, coarse_at_end, slide, is_kept=bool(times))
-        # Pairs without a kept row do not add to the shared error. If they did, entering contacts would state 9 % more,
-        # and no row fewer would be beyond it.
+        # Only pairs with a kept row add to the shared error. If all pairs did, contacts with entering cells would state
+        # 9 % more, and as many rows would be beyond the tolerance.
         if times and not pair.is_soft:
             entered = force_of_entered(scene, start, pair.second)
             error = replace(error, shared=shared_part(scene.memory, pair.length) * entered)

@@ -190,9 +190,8 @@ def solve_contact(
         touching = free.touching
         duality = duality_gap(free, under_load)
         rounding = duality_rounding(grid, free)
-        if (
-            free.largest_residual == 0 and rests_on_guess
-        ):  # as with a single cell: no step would correct the displacement
+        # as with a single cell: no step would correct the displacement
+        if free.largest_residual == 0 and rests_on_guess:
             separation = problem.separation_under(pressure)
             rests_on_guess = False
             continue
