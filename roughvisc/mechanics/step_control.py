@@ -75,18 +75,25 @@ class Pair:
         Both solutions before the pair.
     first, second : Point
         Fine solution after each step.
-    coarse_end : Point
+    coarse_step : Point
         Coarse solution at the end, in one step.
+    end, coarse_end : Point
+        Both solutions at the end; if the pair is soft and has a kept row, with the pressures at that time.
     is_soft : bool
         Whether hardly any of the compliance of the pair is instantaneous.
+    has_row : bool
+        Whether the pair contains a kept row.
     """
 
     start: Point
     coarse_start: Point
     first: Point
     second: Point
+    coarse_step: Point
+    end: Point
     coarse_end: Point
     is_soft: bool
+    has_row: bool
 
     @property
     def length(self) -> float:
@@ -220,14 +227,7 @@ def pair_ends(scene: Scene, number: int, now: float, length: float, *, is_first:
 
 
 def errors_over_allowed(
-    scene: Scene,
-    pair: Pair,
-    number: int,
-    error: StepErrors,
-    shared_so_far: float,
-    largest: Largest,
-    *,
-    has_row: bool,
+    scene: Scene, pair: Pair, number: int, error: StepErrors, former: StepErrors, largest: Largest
 ) -> tuple[float, float]:
     """Return the error that a pair adds at the next kept time, over the allowed error, and the error at its end.
 
@@ -245,14 +245,10 @@ def errors_over_allowed(
         Both solutions.
     number : int
         Index of the segment.
-    error : StepErrors
-        Error at the end of the pair, from the difference of both solutions.
-    shared_so_far : float
-        Error of the pressure that both solutions share, with the remaining error from before the pair. [N]
+    error, former : StepErrors
+        Error at the end of the pair, from the difference of both solutions, and stated error before the pair.
     largest : Largest
         Forces and approaches until the pair.
-    has_row : bool
-        Whether the pair contains a kept row.
     """
     second = pair.second
     taken = pair.length
@@ -260,20 +256,21 @@ def errors_over_allowed(
     least = least_approach(scene, second.time, force)
     approach = max(largest.approach, abs(pair.first.approach), abs(second.approach), least)
 
-    at_row = 0.0
+    of_pressure = of_approach = 0.0  # at the row
     factor, factor_of_approach = stated_over_difference(scene)
     # a pair that is short for its place in the segment is not repeated: see FIRST_PAIR
     if scene.keeps(second.time) and taken > FIRST_PAIR * (second.time - scene.program.corners[number]):
         # The rows state only a part of the difference. The whole difference is compared with the tolerance, because
         # rows also state the errors of solver and series. The stated error with the shared one may be larger.
+        shared = error.shared + former.shared * scene.memory.remaining(taken)
         force_at_end = max(largest.force, second.size, scene.least_force)
         approach_at_end = max(largest.approach, abs(second.approach), least)
-        of_pressure = max(error.pressure / factor, error.pressure + shared_so_far) / force_at_end
-        at_row = max(of_pressure, error.approach / factor_of_approach / approach_at_end) / scene.tolerance
+        of_pressure = max(error.pressure / factor, error.pressure + shared) / force_at_end
+        of_approach = error.approach / factor_of_approach / approach_at_end
 
-    following = second.time if has_row else min(scene.next_kept(second.time), scene.program.duration)
+    following = second.time if pair.has_row else min(scene.next_kept(second.time), scene.program.duration)
     rise = rise_until(scene, number, second, following)
-    expected = 0.0 if has_row else force_ahead(scene, pair, following, largest)
+    expected = 0.0 if pair.has_row else force_ahead(scene, pair, following, largest)
     # under a load the approach grows at least as the root of the load: a cone
     scales = max(force, second.size * rise, expected), max(approach, abs(second.approach) * rise**0.5)
     allowed = ALLOWED_SOFT if scene.becomes_soft else ALLOWED
@@ -284,9 +281,12 @@ def errors_over_allowed(
     # When surfaces have just touched again, the force is smaller than the errors from before: do not resolve it.
     scales = max(scales[0], scene.tolerance * largest.of_all), scales[1]
     ratio = added_error(scene, pair, number, following, scales) / (allowed * scene.tolerance)
-    if max(ratio, error.shared / force / (allowed * scene.tolerance)) <= 1:
-        at_row = 0.0  # the pair adds little: the error is from before it
-    return ratio, at_row
+    if max(ratio, error.shared / force / (allowed * scene.tolerance)) <= 1:  # the errors are from before the pair
+        of_approach = 0.0
+        # the pressure of a soft body jumps where a cell enters, and forgets this
+        entered = (pair.end.contact | pair.coarse_end.contact) & ~pair.start.contact
+        of_pressure = of_pressure if pair.end is not second and bool(entered.any()) else 0.0
+    return ratio, max(of_pressure, of_approach) / scene.tolerance
 
 
 def least_approach(scene: Scene, time: float, force: float) -> float:
@@ -382,9 +382,12 @@ def added_error(scene: Scene, pair: Pair, number: int, following: float, scales:
     """Return the error that a pair adds at the next kept time: of pressure, approach, and displaced surface.
 
     The error is the change of the difference between both solutions over the pair, from its value before the pair or
-    from the part that relaxation leaves of this value, whichever is smaller. Errors of the approach under a load do not
-    fade, and those of pairs add up: if the error stated before the pair exceeds the tolerance, the error of the pair
-    counts as many times, at most `REJECTED` times.
+    from the part that relaxation leaves of this value, whichever is smaller. If the pair is soft and has a kept row, it
+    is at most the difference at the end, because a soft body forgets former pressures.
+
+    Under a load the change of the approach counts, unless its difference falls without a change of sign. These errors
+    do not fade, and those of pairs add up: if the error stated before the pair exceeds the tolerance, the error of the
+    pair counts as many times, at most `REJECTED` times.
 
     Parameters
     ----------
@@ -398,15 +401,17 @@ def added_error(scene: Scene, pair: Pair, number: int, following: float, scales:
     memory = scene.memory
     factor_of_approach = stated_over_difference(scene)[1]
     second = pair.second
-    coarse_end = pair.coarse_end
+    coarse = pair.coarse_step
     taken = pair.length
     is_soft = pair.is_soft
     by_load = scene.program.segments[number].control == "load"
     receding = pair.receding()
-    difference = second.pressure - coarse_end.pressure
+    difference = second.pressure - coarse.pressure
     former = pair.start.pressure - pair.coarse_start.pressure
     change = float(abs(difference - former).sum())
     if is_soft:
+        if pair.end is not second:
+            change = min(change, float(abs(pair.end.pressure - pair.coarse_end.pressure).sum()))
         remains = memory.compliance(taken) / memory.compliance(following - second.time + taken)
         remains = 1.0 if receding else remains
     else:
@@ -419,12 +424,13 @@ def added_error(scene: Scene, pair: Pair, number: int, following: float, scales:
         remains = max(memory.remaining(ahead) / left if left > 0 else 0.0, LEAST_REMAINING)
     error = change * scene.grid.cell_area / scales[0] * remains
     if by_load:
-        former_of_approach = pair.start.approach - pair.coarse_start.approach
-        of_approach = abs(second.approach - coarse_end.approach - former_of_approach) / scales[1]
-        before = factor_of_approach * abs(former_of_approach) / scales[1]
-        error = max(error, of_approach * min(max(before / scene.tolerance, 1.0), REJECTED))
+        before = pair.start.approach - pair.coarse_start.approach
+        after = second.approach - coarse.approach
+        of_approach = max(abs(after) - abs(before), 0.0) if after * before > 0 else abs(after - before)
+        times = factor_of_approach * abs(before) / scales[1] / scene.tolerance
+        error = max(error, of_approach / scales[1] * min(max(times, 1.0), REJECTED))
     if not by_load or second.is_open or is_soft:
-        surface = memory.displacement(second.history)[0] - memory.displacement(coarse_end.history)[0]
+        surface = memory.displacement(second.history)[0] - memory.displacement(coarse.history)[0]
         surface -= memory.displacement(pair.start.history)[0] - memory.displacement(pair.coarse_start.history)[0]
         error = max(error, float(abs(surface).max()) / scales[1] * (1.0 if is_soft or receding else remains))
     return error

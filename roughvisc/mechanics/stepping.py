@@ -424,9 +424,9 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         middle, last = pair_ends(scene, number, start.time, length, is_first=is_first)
         # if no times are given, the end of each pair is a row
         times = (last,) if scene.kept is None else scene.kept_within(start.time, last)
-        pair, at_end, coarse_at_end = solve_pair(scene, state, middle, last, has_row=bool(times))
+        pair = solve_pair(scene, state, middle, last, has_row=bool(times))
         slide = scene.motions[number] if times else None
-        error = difference(scene, start, at_end, coarse_at_end, slide, is_kept=bool(times))
+        error = difference(scene, start, pair.end, pair.coarse_end, slide, is_kept=bool(times))
         # Only pairs with a kept row add to the shared error. If all pairs did, contacts with entering cells would state
         # 9 % more, and as many rows would be beyond the tolerance.
         if times and not pair.is_soft:
@@ -435,23 +435,25 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         if scene.time_step is not None:
             next_length = length
             break
-        shared_so_far = error.shared + state.errors.shared * scene.memory.remaining(pair.length)
-        ratio, at_row = errors_over_allowed(scene, pair, number, error, shared_so_far, largest, has_row=bool(times))
+        errors = errors_over_allowed(scene, pair, number, error, state.errors, largest)
+        # where a cell is in contact in one solution only, their difference grows however short the pair is
+        if errors[0] > 1 and bool((start.contact != pair.coarse_start.contact).any()):
+            errors = min(errors, errors_of_pair_alone(scene, pair, number, error, state.errors, largest))
         loses_contact = not start.is_open and (pair.first.is_open or pair.second.is_open)
         opens = not by_load and loses_contact and pair.second.approach >= start.approach
-        again, proposed = controller.judge(pair.length, ratio, at_row, opens=opens)
+        again, proposed = controller.judge(pair.length, *errors, opens=opens)
         if again is None:
             next_length = proposed
             break
         controller = again
         length = proposed
-        del pair, at_end, coarse_at_end  # frees their memory while the pair is repeated
+        del pair  # frees its memory while it is repeated
 
-    return accepted(scene, state, pair, at_end, times, error, next_length)
+    return accepted(scene, state, pair, times, error, next_length)
 
 
-def solve_pair(scene: Scene, state: State, middle: float, last: float, *, has_row: bool) -> tuple[Pair, Point, Point]:
-    """Return a pair of steps, and both solutions at its end with the pressures at that time if it has a kept row."""
+def solve_pair(scene: Scene, state: State, middle: float, last: float, *, has_row: bool) -> Pair:
+    """Return a pair of steps, with the pressures at the time of its end if it has a kept row."""
     start = state.fine
     coarse = state.coarse or state.fine
     number = state.segment
@@ -460,24 +462,46 @@ def solve_pair(scene: Scene, state: State, middle: float, last: float, *, has_ro
     solver_part = END_STEP if needs_pressure else SOLVER_PART
     first = take_step(scene, start, middle, number, solver_part=solver_part)
     second = take_step(scene, first, last, number, solver_part=solver_part)
-    coarse_end = take_step(
-        scene, coarse, last, number, candidates=around_coarse(second, coarse, start), solver_part=solver_part
-    )
-    pair = Pair(start, coarse, first, second, coarse_end, is_soft)
-    if not needs_pressure:
-        return pair, second, coarse_end
-    return (
-        pair,
-        with_final_pressure(scene, first, second, number),
-        with_final_pressure(scene, coarse, coarse_end, number),
-    )
+    coarse_step, coarse_end = coarse_solution(scene, coarse, start, second, number, needs_pressure=needs_pressure)
+    end = with_final_pressure(scene, first, second, number) if needs_pressure else second
+    return Pair(start, coarse, first, second, coarse_step, end, coarse_end, is_soft, has_row)
+
+
+def coarse_solution(
+    scene: Scene, coarse: Point, start: Point, second: Point, number: int, *, needs_pressure: bool
+) -> tuple[Point, Point]:
+    """Return the coarse solution after a pair: its step, and the same with the pressure at that time if it is needed.
+
+    Parameters
+    ----------
+    scene, number : Scene, int
+        Input, and index of the segment.
+    coarse, start, second : Point
+        Coarse solution before the pair, fine solution before and after it.
+    needs_pressure : bool
+        Whether the pair is soft and has a kept row.
+    """
+    candidates = around_coarse(second, coarse, start)
+    solver_part = END_STEP if needs_pressure else SOLVER_PART
+    step = take_step(scene, coarse, second.time, number, candidates=candidates, solver_part=solver_part)
+    return step, with_final_pressure(scene, coarse, step, number) if needs_pressure else step
+
+
+def errors_of_pair_alone(
+    scene: Scene, pair: Pair, number: int, error: StepErrors, former: StepErrors, largest: Largest
+) -> tuple[float, float]:
+    """Return the same as :func:`errors_over_allowed`, for a coarse solution that starts from the fine one."""
+    start = pair.start
+    needs_pressure = pair.has_row and pair.is_soft
+    step, end = coarse_solution(scene, start, start, pair.second, number, needs_pressure=needs_pressure)
+    alone = replace(pair, coarse_start=start, coarse_step=step, coarse_end=end)
+    return errors_over_allowed(scene, alone, number, error, former, largest)
 
 
 def accepted(
     scene: Scene,
     state: State,
     pair: Pair,
-    at_end: Point,
     times: tuple[float, ...],
     error: StepErrors,
     next_length: float,
@@ -490,8 +514,6 @@ def accepted(
         Input, and state before the pair.
     pair : Pair
         Both solutions.
-    at_end : Point
-        Fine solution at the end, with the pressure at that time.
     times : tuple of float
         Kept times of the pair. [s]
     error : StepErrors
@@ -515,7 +537,7 @@ def accepted(
         scene,
         state,
         [pair.first, pair.second],
-        pair.coarse_end,
+        pair.coarse_step,
         next_length,
         errors=stated,
         work=state.work + works[-1],
@@ -544,7 +566,7 @@ def accepted(
             work_relaxed=after.work_relaxed,
         )
         steps.append(Step(point, with_late_entry(between, point), number, within, is_end=False))
-    return [*steps, Step(at_end, with_late_entry(stated, at_end), number, after)]
+    return [*steps, Step(pair.end, with_late_entry(stated, pair.end), number, after)]
 
 
 def last_entered(scene: Scene, pair: Pair, former: tuple[float, float], error: float) -> tuple[float, float]:
