@@ -80,3 +80,50 @@ def test_one_kept_row__takes_no_more_steps_than_many_where_the_force_vanishes(bo
         return int(rv.observables.history(ds).convolutions.sum())
 
     assert convolutions(1) < 2 * convolutions(40)
+
+
+def convolutions_and_pairs(surface, body, program, times, tolerance):
+    numerics = {"tolerance": tolerance, "fields": (), "grid_error": False, "edge": "accept", "progress": False}
+    steps = rv.observables.history(rv.simulate(surface, body, program, times=times, **numerics))
+    return int(steps.convolutions.sum()), steps.sizes["time"]
+
+
+def test_ball_that_touches_a_fluid_again__takes_more_steps_for_accuracy_only():
+    """A cell is in contact in one solution only for a while, and shorter steps do not change that."""
+    ball, fluid = rv.sphere(1.0, 1.6, (17, 15)), rv.Prony(1.0, 0.2, (1.0,), (1.0,))
+    program = rv.Program().approach(0.3, over=0.1).hold(1.0).approach(0.15, over=0).hold(3.0)
+    loose, sharp = (
+        convolutions_and_pairs(ball, fluid, program, [program.duration], tolerance)[1] for tolerance in (1e-2, 1e-3)
+    )
+    assert sharp < 5 * loose  # an error of order 1.5 in the length
+
+
+ROUGH = rv.self_affine((1.1, 1.05), (18, 15), hurst=0.8, rms_height=0.04, shortcut=0.35, seed=5)
+
+
+@pytest.mark.parametrize(
+    ("surface", "body", "program"),
+    [
+        pytest.param(
+            rv.flat_punch(1.0, 2.6, 13),
+            rv.Prony(0.08, 0.0, (1.0,), (1e-3,)),
+            rv.Program().load(1.0, over=2).load(0.0, over=2),
+            id="error_of_the_approach_fades",
+        ),
+        pytest.param(
+            ROUGH, rv.kelvin_voigt(1.0, 1.0), rv.Program().load(0.1, over=1).load(0.03, over=1), id="cells_enter"
+        ),
+    ],
+)
+def test_all_steps_as_rows__cost_little_more_than_fifty_rows(surface, body, program):
+    every = [program.duration * number / 50 for number in range(1, 51)]
+    all_steps, fifty = (convolutions_and_pairs(surface, body, program, times, 1e-2)[0] for times in (None, every))
+    assert all_steps < 2.5 * fifty
+
+
+def test_last_row_of_a_soft_body__is_repeated_if_a_cell_enters_before_it():
+    """The pressure of a cell that has just entered is uncertain: one pair would state five tolerances."""
+    program = rv.Program().load(0.1, over=1)
+    ball, body = rv.sphere(1.0, 1.6, (17, 15)), rv.kelvin_voigt(1.0, 1.0)
+    ds = rv.simulate(ball, body, program, tolerance=1e-2, fields=(), edge="accept", progress=False)
+    assert float(ds.stated_error[-1]) < 1e-2
