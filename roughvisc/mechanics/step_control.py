@@ -100,6 +100,11 @@ class Pair:
         """Length of the pair. [s]"""
         return self.second.time - self.start.time
 
+    @property
+    def has_final_pressure(self) -> bool:
+        """Whether the pressure at the end is another one than that of the last step."""
+        return self.end is not self.second
+
     def receding(self) -> bool:
         """Return whether cells have left the contact."""
         return bool((self.start.contact & ~self.second.contact).any())
@@ -232,10 +237,11 @@ def errors_over_allowed(
     """Return the error that a pair adds at the next kept time, over the allowed error, and the error at its end.
 
     If the pair has a kept row, its end counts as the next kept time. The error at the end is relative to the tolerance,
-    and zero if the end is not kept, or the pair is short or adds little. Errors are relative to the largest force and
-    approach of the kept rows, of the pair, and of the next row as far as it is known. While the approach is held, they
-    are relative to the largest force of the kept rows and the force that relaxation leaves until the next one. The
-    force is at least the tolerance times the largest force of all steps.
+    and zero if the end is not kept, or if the pair is short or adds little; but if a cell of a soft body enters, its
+    pressure counts. Errors are relative to the largest force and approach of the kept rows, of the pair, and of the
+    next row as far as it is known. While the approach is held, they are relative to the largest force of the kept rows
+    and the force that relaxation leaves until the next one. The force is at least the tolerance times the largest force
+    of all steps.
 
     Parameters
     ----------
@@ -285,7 +291,7 @@ def errors_over_allowed(
         of_approach = 0.0
         # the pressure of a soft body jumps where a cell enters, and forgets this
         entered = (pair.end.contact | pair.coarse_end.contact) & ~pair.start.contact
-        of_pressure = of_pressure if pair.end is not second and bool(entered.any()) else 0.0
+        of_pressure = of_pressure if pair.has_final_pressure and bool(entered.any()) else 0.0
     return ratio, max(of_pressure, of_approach) / scene.tolerance
 
 
@@ -410,7 +416,7 @@ def added_error(scene: Scene, pair: Pair, number: int, following: float, scales:
     former = pair.start.pressure - pair.coarse_start.pressure
     change = float(abs(difference - former).sum())
     if is_soft:
-        if pair.end is not second:
+        if pair.has_final_pressure:
             change = min(change, float(abs(pair.end.pressure - pair.coarse_end.pressure).sum()))
         remains = memory.compliance(taken) / memory.compliance(following - second.time + taken)
         remains = 1.0 if receding else remains

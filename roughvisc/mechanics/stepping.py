@@ -435,13 +435,13 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         if scene.time_step is not None:
             next_length = length
             break
-        errors = errors_over_allowed(scene, pair, number, error, state.errors, largest)
+        ratios = errors_over_allowed(scene, pair, number, error, state.errors, largest)
         # where a cell is in contact in one solution only, their difference grows however short the pair is
-        if errors[0] > 1 and bool((start.contact != pair.coarse_start.contact).any()):
-            errors = min(errors, errors_of_pair_alone(scene, pair, number, error, state.errors, largest))
+        if ratios[0] > 1 and bool((start.contact != pair.coarse_start.contact).any()):
+            ratios = min(ratios, errors_of_pair_alone(scene, pair, number, error, state.errors, largest))
         loses_contact = not start.is_open and (pair.first.is_open or pair.second.is_open)
         opens = not by_load and loses_contact and pair.second.approach >= start.approach
-        again, proposed = controller.judge(pair.length, *errors, opens=opens)
+        again, proposed = controller.judge(pair.length, *ratios, opens=opens)
         if again is None:
             next_length = proposed
             break
@@ -492,7 +492,7 @@ def errors_of_pair_alone(
 ) -> tuple[float, float]:
     """Return the same as :func:`errors_over_allowed`, for a coarse solution that starts from the fine one."""
     start = pair.start
-    needs_pressure = pair.has_row and pair.is_soft
+    needs_pressure = pair.is_soft and pair.has_row
     step, end = coarse_solution(scene, start, start, pair.second, number, needs_pressure=needs_pressure)
     alone = replace(pair, coarse_start=start, coarse_step=step, coarse_end=end)
     return errors_over_allowed(scene, alone, number, error, former, largest)
