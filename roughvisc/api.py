@@ -75,7 +75,8 @@ def simulate(
     times : int, sequence of float or str, or str, optional
         Output times, reached exactly. A whole number: how many rows, counting time zero and the corners of the program,
         the others where the result changes most. A list, or one text with a unit: the times. None, in a study
-        ``"all"``: all corners and every accepted step whose stated error is at most half the tolerance. [s]
+        ``"all"``: all corners, every accepted step whose stated error is at most half the tolerance, and all steps of a
+        fixed length or of a slide. [s]
     fields : sequence of str, or str
         Fields to keep: any of ``pressure``, ``gap``, ``displacement``.
     missing : {"refuse", "absent"}

@@ -156,8 +156,8 @@ def error_columns(step: Step, scene: Scene) -> dict[str, float]:
     control = scene.program.segments[step.segment].control
     given = scene.program.prescribes[step.segment]
     remembers = not scene.memory.is_elastic
-    largest_force = max(state.kept_force, point.size)
-    largest_approach = max(state.kept_approach, abs(point.approach))
+    force_scale = max(state.kept_force, point.size)
+    approach_scale = max(state.kept_approach, abs(point.approach))
     series_error = scene.memory.series_error  # from the shortest known age on
     loaded = max(state.largest_force, point.size, 1e-300)
     reached = max(state.largest_approach, abs(point.approach), 1e-300)
@@ -174,7 +174,7 @@ def error_columns(step: Step, scene: Scene) -> dict[str, float]:
     if remembers:
         solved = point.solver_error + INHERITED * state.solver_error
     else:
-        solved = max(point.solver_error, LEAST * scene.tolerance * (largest_force > 0))
+        solved = max(point.solver_error, LEAST * scene.tolerance * (force_scale > 0))
     work = abs(state.work_difference) + state.work_curved + state.work_relaxed
     of_work = OF_WORK_OF_STEPS if remembers else OF_WORK["load" if control == "load" else "approach"]
     work += (of_work * solved + series_error) * loaded * reached
@@ -185,9 +185,9 @@ def error_columns(step: Step, scene: Scene) -> dict[str, float]:
         approach = error.approach + point.solver_error_approach + series_error * reached
         approach += INHERITED_APPROACH * state.solver_error * reached if remembers else 0.0
     stepped = error.pressure + error.shared
-    pressure = (stepped + solved * point.size + of_force) / largest_force if largest_force > 0 else solved
-    per_force = largest_force or math.inf
-    per_approach = max(largest_approach or math.inf, least_approach(scene, point.time, largest_force))
+    pressure = (stepped + solved * point.size + of_force) / force_scale if force_scale > 0 else solved
+    per_force = force_scale or math.inf
+    per_approach = max(approach_scale or math.inf, least_approach(scene, point.time, force_scale))
     return {
         "time_error": max(stepped / per_force, error.force / per_force, error.approach / per_approach),
         "stated_error": max(pressure, force / per_force, approach / per_approach),

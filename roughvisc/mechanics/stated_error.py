@@ -1,7 +1,7 @@
 """Stated error of the time steps: the difference between two solutions, and what both share.
 
-The fine solution takes a pair of steps, the coarse solution takes the pair as one step. :func:`difference` states their
-difference, times a factor, as the error at the end of the pair. The difference may miss an error:
+The fine solution takes a pair of steps, the coarse solution takes the pair as one step. Their difference, times a
+factor, is the error at the end of the pair (:func:`stated_difference`). The difference may miss an error:
 
 - it has parts of first and of second order and may pass through zero (:meth:`StepErrors.at_least`);
 - the pressure of a cell that has just entered the contact is uncertain (:func:`uncertain_part`, :func:`shared_part`,
@@ -74,8 +74,10 @@ class StepErrors:
     friction : float
         Error of the friction force of a slide. [N]
     shared : float
-        Further error of the pressure, which the difference does not contain because both solutions share it: in cells
-        that have entered, and in slides by one cell. `pressure` does not contain it. [N]
+        Further error of the pressure, which the difference does not contain: of cells that have entered, as both
+        solutions share it (:func:`shared_part`), of rows inside pairs (:func:`stated_inside`), of cells of a soft body
+        that may have entered late (:func:`error_of_late_entry`), and of slides by one cell. `pressure` does not contain
+        it. [N]
     gap : float
         Error of the gap of a soft body. [m]
     """
@@ -101,11 +103,11 @@ class StepErrors:
         former : StepErrors
             Errors before the pair.
         left : float
-            Part of an error of the pressure that relaxation leaves until then.
+            Part of an error of the pressure that relaxation leaves over the pair.
         left_of_friction : float
             Part of the friction force that is left, see :func:`left_of_friction`.
         is_soft : bool
-            Whether the pair is soft: the errors of pressure and force do not fade then.
+            Whether the pair is soft: errors of pressure and force follow from that of the surface, and do not fade.
         """
         lasting = LASTING if is_soft else LASTING * left
         return replace(
@@ -138,7 +140,7 @@ def stated_over_difference(scene: Scene) -> tuple[float, float]:
     return STATED_SOFT if scene.becomes_soft else STATED
 
 
-def difference(
+def stated_difference(
     scene: Scene,
     before: Point,
     fine: Point,
@@ -228,7 +230,7 @@ def with_former(
     *,
     is_soft: bool,
 ) -> StepErrors:
-    """Return the stated errors at a point of a pair, and include the errors from before the pair.
+    """Return the stated errors at a point of a pair, at least a part of those from before the pair.
 
     Parameters
     ----------
@@ -237,7 +239,7 @@ def with_former(
     start, point : Point
         Fine solution before the pair, and at a point of the pair.
     error, former : StepErrors
-        Errors at the point without those before the pair, and stated errors before the pair.
+        Errors at the point from the difference of both solutions, and stated errors before the pair.
     slide : Slide or None
         Motion, if the error of the friction force is needed.
     is_soft : bool

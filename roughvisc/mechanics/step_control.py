@@ -115,18 +115,20 @@ class Largest(NamedTuple):
 
     Attributes
     ----------
-    force, approach : float
-        Largest values of the kept rows so far; a prescribed approach, which states no error, of all steps. [N, m]
-    of_all : float
+    kept_force : float
+        Largest force of the kept rows so far, of all steps if no times are given. [N]
+    approach : float
+        Largest approach of the same rows; a prescribed approach, which states no error, of all steps. [m]
+    force : float
         Largest force of all steps. [N]
     peak : tuple of float
         Force, approach and time of the last step whose force exceeded what relaxation had left of the peak before it.
         [N, m, s]
     """
 
-    force: float
+    kept_force: float
     approach: float
-    of_all: float
+    force: float
     peak: tuple[float, float, float]
 
 
@@ -178,8 +180,8 @@ class Controller:
                 return replace(again, refused_at_row=at_row), 0.5 * taken
         largest = LARGEST_GROWTH / (1 + SLACK)
         if self.refused <= ratio:  # the error does not depend on the length, and the next pair need not be as short
-            following = min(self.tried, largest * taken) if self.refused_at_row == math.inf else taken
-            return None, max(following, self.shortest)
+            proposed = min(self.tried, largest * taken) if self.refused_at_row == math.inf else taken
+            return None, max(proposed, self.shortest)
         if self.refused < math.inf:  # after a refused trial steps do not grow (Hairer, Norsett, Wanner I, section II.4)
             largest = 1.0
         return None, max(taken * min(max(factor, SHRINK), largest), self.shortest)
@@ -210,9 +212,9 @@ def pair_ends(scene: Scene, number: int, now: float, length: float, *, is_first:
     if scene.time_step is not None:
         longest = scene.time_step * (1 + ROUNDED)  # up to rounding
         event = min(scene.next_kept(now), end)
-        following = min(scene.next_kept(event), end)
-        if event - now <= longest and event < following <= event + longest:
-            return event, following
+        later = min(scene.next_kept(event), end)
+        if event - now <= longest and event < later <= event + longest:
+            return event, later
         pairs = max(math.ceil((event - now) / (2 * scene.time_step) - ROUNDED), 1)
         return now + (event - now) / (2 * pairs), event if pairs == 1 else now + (event - now) / pairs
     slack = SLACK
@@ -258,7 +260,7 @@ def errors_over_allowed(
     """
     second = pair.second
     taken = pair.length
-    force = max(largest.force, pair.first.size, second.size, scene.least_force)
+    force = max(largest.kept_force, pair.first.size, second.size, scene.least_force)
     least = least_approach(scene, second.time, force)
     approach = max(largest.approach, abs(pair.first.approach), abs(second.approach), least)
 
@@ -266,30 +268,30 @@ def errors_over_allowed(
     factor, factor_of_approach = stated_over_difference(scene)
     # a pair that is short for its place in the segment is not repeated: see FIRST_PAIR
     if scene.keeps(second.time) and taken > FIRST_PAIR * (second.time - scene.program.corners[number]):
-        # The rows state only a part of the difference. The whole difference is compared with the tolerance, because
-        # rows also state the errors of solver and series. The stated error with the shared one may be larger.
+        # Most bodies state a part of the difference. The whole difference is compared with the tolerance, because rows
+        # also state the errors of solver and series. The stated error of the pressure may be larger, and counts then.
         shared = error.shared + former.shared * scene.memory.remaining(taken)
-        force_at_end = max(largest.force, second.size, scene.least_force)
+        force_at_end = max(largest.kept_force, second.size, scene.least_force)
         approach_at_end = max(largest.approach, abs(second.approach), least)
         of_pressure = max(error.pressure / factor, error.pressure + shared) / force_at_end
         of_approach = error.approach / factor_of_approach / approach_at_end
 
-    following = second.time if pair.has_row else min(scene.next_kept(second.time), scene.program.duration)
-    rise = rise_until(scene, number, second, following)
-    expected = 0.0 if pair.has_row else force_ahead(scene, pair, following, largest)
+    next_row = second.time if pair.has_row else min(scene.next_kept(second.time), scene.program.duration)
+    rise = rise_until(scene, number, second, next_row)
+    expected = 0.0 if pair.has_row else force_ahead(scene, pair, next_row, largest)
     # under a load the approach grows at least as the root of the load: a cone
     scales = max(force, second.size * rise, expected), max(approach, abs(second.approach) * rise**0.5)
     allowed = ALLOWED_SOFT if scene.becomes_soft else ALLOWED
-    left, share = relaxed_in_hold(scene, pair, number, following)
+    left, share = relaxed_in_hold(scene, pair, number, next_row)
     if share < 1:
-        scales = max(largest.force, second.size * left, scene.least_force), scales[1]
+        scales = max(largest.kept_force, second.size * left, scene.least_force), scales[1]
         allowed = min(allowed, max(ALLOWED_IN_HOLD * share, LEAST_SHARE * allowed))
     # When surfaces have just touched again, the force is smaller than the errors from before: do not resolve it.
-    scales = max(scales[0], scene.tolerance * largest.of_all), scales[1]
-    ratio = added_error(scene, pair, number, following, scales) / (allowed * scene.tolerance)
+    scales = max(scales[0], scene.tolerance * largest.force), scales[1]
+    ratio = added_error(scene, pair, number, next_row, scales) / (allowed * scene.tolerance)
     if max(ratio, error.shared / force / (allowed * scene.tolerance)) <= 1:  # the errors are from before the pair
         of_approach = 0.0
-        # the pressure of a soft body jumps where a cell enters, and forgets this
+        # the pressure of a soft body jumps in a cell that enters: this error is new
         entered = (pair.end.contact | pair.coarse_end.contact) & ~pair.start.contact
         of_pressure = of_pressure if pair.has_final_pressure and bool(entered.any()) else 0.0
     return ratio, max(of_pressure, of_approach) / scene.tolerance
@@ -311,7 +313,7 @@ def least_approach(scene: Scene, time: float, force: float) -> float:
     return max(rounding * force / (scene.gap.size * scene.grid.cell_area), 1e-300)
 
 
-def force_ahead(scene: Scene, pair: Pair, following: float, largest: Largest) -> float:
+def force_ahead(scene: Scene, pair: Pair, next_row: float, largest: Largest) -> float:
     """Return the force that divides the error at the next kept time, as far as the program tells; else zero. [N]
 
     - Under a load: the prescribed load.
@@ -328,20 +330,20 @@ def force_ahead(scene: Scene, pair: Pair, following: float, largest: Largest) ->
         Input of the time stepping.
     pair : Pair
         Both solutions.
-    following : float
+    next_row : float
         Next kept time. [s]
     largest : Largest
         Forces and approaches until the pair.
     """
     point = pair.second
-    control, value = scene.program.known(following)
+    control, value = scene.program.known(next_row)
     if math.isnan(value) or scene.adhesion is not None:
         return 0.0
     if control == "load":
-        return value or largest.of_all
+        return value or largest.force
     first_touch = float(scene.gap[scene.solid].min())
     if value <= first_touch:  # the undeformed surface is the highest
-        return largest.of_all
+        return largest.force
     force, approach, then = largest.peak
     peak = force * scene.memory.remaining(point.time - then)
     if value <= point.approach:
@@ -356,7 +358,7 @@ def force_ahead(scene: Scene, pair: Pair, following: float, largest: Largest) ->
     return max(grown, point.size + fraction * max(peak - point.size, 0.0))
 
 
-def relaxed_in_hold(scene: Scene, pair: Pair, number: int, following: float) -> tuple[float, float]:
+def relaxed_in_hold(scene: Scene, pair: Pair, number: int, next_row: float) -> tuple[float, float]:
     """Return the part of the force that is left at the next kept time, and the share of a pair in the relaxation.
 
     The share is the ratio of the logarithm of the relaxation in the pair to that from the last kept time to the next
@@ -366,30 +368,30 @@ def relaxed_in_hold(scene: Scene, pair: Pair, number: int, following: float) -> 
     segment = scene.program.segments[number]
     began, end = scene.program.corners[number : number + 2]
     is_held = segment.control == "approach" and segment.holds
-    if not is_held or following > end or pair.second.is_open or scene.kept is None:
+    if not is_held or next_row > end or pair.second.is_open or scene.kept is None:
         return 1.0, 1.0
     relaxation = scene.memory.relaxation
-    times = max(scene.last_kept(pair.start.time), began), pair.start.time, pair.second.time, following
+    times = max(scene.last_kept(pair.start.time), began), pair.start.time, pair.second.time, next_row
     last, before, after, then = (max(relaxation(time - began), ROUNDED) for time in times)
     if then >= last * (1 - ROUNDED):
         return 1.0, 1.0
     return max(then / after, LEAST_REMAINING), math.log(before / after) / math.log(last / then)
 
 
-def rise_until(scene: Scene, number: int, point: Point, following: float) -> float:
+def rise_until(scene: Scene, number: int, point: Point, next_row: float) -> float:
     """Return the growth of the prescribed value until the next kept time, at least one."""
-    until = min(following, scene.program.corners[number + 1])
+    until = min(next_row, scene.program.corners[number + 1])
     now = scene.program.prescribed(number, point.time, point.segment_start)
     then = scene.program.prescribed(number, until, point.segment_start)
     return max(then / now, 1.0) if now > 0 else 1.0
 
 
-def added_error(scene: Scene, pair: Pair, number: int, following: float, scales: tuple[float, float]) -> float:
+def added_error(scene: Scene, pair: Pair, number: int, next_row: float, scales: tuple[float, float]) -> float:
     """Return the error that a pair adds at the next kept time: of pressure, approach, and displaced surface.
 
     The error is the change of the difference between both solutions over the pair, from its value before the pair or
     from the part that relaxation leaves of this value, whichever is smaller. If the pair is soft and has a kept row, it
-    is at most the difference at the end, because a soft body forgets former pressures.
+    is at most the difference at the end: the pressure of a soft step is that of the whole step, not that of the row.
 
     Under a load the change of the approach counts, unless its difference falls without a change of sign. These errors
     do not fade, and those of pairs add up: if the error stated before the pair exceeds the tolerance, the error of the
@@ -399,7 +401,7 @@ def added_error(scene: Scene, pair: Pair, number: int, following: float, scales:
     ----------
     scene, pair, number : Scene, Pair, int
         Input, both solutions, and index of the segment.
-    following : float
+    next_row : float
         Next kept time. [s]
     scales : tuple of float
         Force and approach to which errors are relative. [N, m]
@@ -418,14 +420,14 @@ def added_error(scene: Scene, pair: Pair, number: int, following: float, scales:
     if is_soft:
         if pair.has_final_pressure:
             change = min(change, float(abs(pair.end.pressure - pair.coarse_end.pressure).sum()))
-        remains = memory.compliance(taken) / memory.compliance(following - second.time + taken)
+        remains = memory.compliance(taken) / memory.compliance(next_row - second.time + taken)
         remains = 1.0 if receding else remains
     else:
         change = min(change, float(abs(difference - memory.remaining(taken) * former).sum()))
-        ahead = following - second.time
+        ahead = next_row - second.time
         left = 1.0
         if not by_load:  # the error arises about the middle of the pair, and has relaxed since: count from there
-            ahead = following - pair.first.time
+            ahead = next_row - pair.first.time
             left = memory.remaining(taken / 2)
         remains = max(memory.remaining(ahead) / left if left > 0 else 0.0, LEAST_REMAINING)
     error = change * scene.grid.cell_area / scales[0] * remains
@@ -433,8 +435,8 @@ def added_error(scene: Scene, pair: Pair, number: int, following: float, scales:
         before = pair.start.approach - pair.coarse_start.approach
         after = second.approach - coarse.approach
         of_approach = max(abs(after) - abs(before), 0.0) if after * before > 0 else abs(after - before)
-        times = factor_of_approach * abs(before) / scales[1] / scene.tolerance
-        error = max(error, of_approach / scales[1] * min(max(times, 1.0), REJECTED))
+        multiple = factor_of_approach * abs(before) / scales[1] / scene.tolerance
+        error = max(error, of_approach / scales[1] * min(max(multiple, 1.0), REJECTED))
     if not by_load or second.is_open or is_soft:
         surface = memory.displacement(second.history)[0] - memory.displacement(coarse.history)[0]
         surface -= memory.displacement(pair.start.history)[0] - memory.displacement(pair.coarse_start.history)[0]

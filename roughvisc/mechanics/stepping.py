@@ -35,7 +35,6 @@ from roughvisc.mechanics.stated_error import (
     LASTING,
     UNBOUNDED,
     StepErrors,
-    difference,
     error_of_late_entry,
     force_of_entered,
     friction,
@@ -43,6 +42,7 @@ from roughvisc.mechanics.stated_error import (
     shared_part,
     skipped_friction,
     skipped_pressure,
+    stated_difference,
     stated_inside,
     touch,
     transient_error,
@@ -98,7 +98,8 @@ class State:
     largest_force, largest_approach : float
         Largest values so far. [N, m]
     kept_force, kept_approach : float
-        Largest values of the yielded steps at kept times so far, this one included (:func:`with_largest_kept`). [N, m]
+        Largest values of the yielded steps at kept times so far, this one included (:func:`with_largest_kept`); of all
+        yielded steps if no times are given. [N, m]
     solver_error : float
         Largest relative error of the pressure due to the contact solver so far.
     work : float
@@ -149,7 +150,7 @@ class Step(NamedTuple):
     Attributes
     ----------
     point : Point
-        Fine solution, with the pressure at the end of the step.
+        Fine solution. A soft step that is not kept has the pressure of the whole step, any other that at its end.
     errors : StepErrors
         Error of the time steps.
     segment : int
@@ -266,7 +267,7 @@ def next_segment(scene: Scene, state: State) -> State:
     fine = state.fine
     index = state.segment + 1
     last = segments[index - 1]
-    following = segments[min(index, len(segments) - 1)]
+    entered = segments[min(index, len(segments) - 1)]
     corner = scene.transitions[index - 1]
     load = fine.force
     if last.duration == 0 and not scene.can_jump:
@@ -281,7 +282,7 @@ def next_segment(scene: Scene, state: State) -> State:
     jumped = load != fine.force
     points = []
     for point in (fine, state.coarse or fine):
-        start = point.approach if following.control == "approach" else load if jumped else point.force
+        start = point.approach if entered.control == "approach" else load if jumped else point.force
         is_late = jumped or (corner.is_abrupt and not point.is_open)
         points.append(replace(without_past(point), segment_start=start, is_late=is_late))
     keeps_length = corner.is_smooth and not fine.is_open and scene.adhesion is None
@@ -303,7 +304,7 @@ def single_step(scene: Scene, state: State, time: float, *, may_refuse: bool = F
     if coarse is not fine:
         rule: Rule | None = "linear" if coarse.is_open else None
         other = take_step(scene, coarse, time, number, candidates=around_coarse(new, coarse, fine), rule=rule)
-    error = difference(scene, fine, new, other, scene.motions[number], is_kept=scene.keeps(time))
+    error = stated_difference(scene, fine, new, other, scene.motions[number], is_kept=scene.keeps(time))
     left = scene.memory.remaining(time - fine.time)
     lasting = error.at_least(state.errors, left)
     error = replace(error, shared=lasting.shared) if new.is_open else lasting
@@ -359,9 +360,9 @@ def step_on_path(scene: Scene, state: State, segment: Segment, event: float) -> 
             break
         length = taken / 2
         is_refused = True
-    following = taken / 2 if is_refused and lost == 0 else GROWTH * taken
+    length = taken / 2 if is_refused and lost == 0 else GROWTH * taken
     total = state.dissipated + lost
-    after = replace(step.state, dissipated=total, next_length=0.0 if step.state.segment > state.segment else following)
+    after = replace(step.state, dissipated=total, next_length=0.0 if step.state.segment > state.segment else length)
     return step._replace(state=after)
 
 
@@ -414,19 +415,15 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         length = min(length, segment.period / PAIRS_OF_A_CYCLE)
     controller = Controller(shortest_length(scene, number))
     by_load = segment.control == "load"
-    largest = Largest(
-        state.kept_force,
-        state.kept_approach if by_load else state.largest_approach,
-        state.largest_force,
-        state.peak,
-    )
+    approach = state.kept_approach if by_load else state.largest_approach
+    largest = Largest(state.kept_force, approach, state.largest_force, state.peak)
     while True:
         middle, last = pair_ends(scene, number, start.time, length, is_first=is_first)
         # if no times are given, the end of each pair is a row
         times = (last,) if scene.kept is None else scene.kept_within(start.time, last)
         pair = solve_pair(scene, state, middle, last, has_row=bool(times))
         slide = scene.motions[number] if times else None
-        error = difference(scene, start, pair.end, pair.coarse_end, slide, is_kept=bool(times))
+        error = stated_difference(scene, start, pair.end, pair.coarse_end, slide, is_kept=bool(times))
         # Only pairs with a kept row add to the shared error. If all pairs did, contacts with entering cells would state
         # 9 % more, and as many rows would be beyond the tolerance.
         if times and not pair.is_soft:
@@ -556,12 +553,12 @@ def accepted(
     of_work = max(state.work_difference, after.work_difference, key=abs)
     for point, work in zip(inside, works[:-1], strict=True):
         between = stated_inside(scene, start, point, stated, state.errors, slide, is_soft=pair.is_soft)
-        is_late = point.time > pair.first.time
+        in_second = point.time > pair.first.time
         within = replace(
             state,
-            solver_error=max(state.solver_error, pair.first.solver_error if is_late else 0.0),
+            solver_error=max(state.solver_error, pair.first.solver_error if in_second else 0.0),
             work=state.work + work,
-            work_curved=math.hypot(state.work_curved, last_error if is_late else first_error),
+            work_curved=math.hypot(state.work_curved, last_error if in_second else first_error),
             work_difference=of_work,
             work_relaxed=after.work_relaxed,
         )
@@ -608,7 +605,7 @@ def with_final_pressure(scene: Scene, before: Point, point: Point, number: int) 
     if scene.program.segments[number].control == "approach":
         value = 2 * point.approach - scene.program.prescribed(number, point.time - ahead, point.segment_start)
     later = take_step(scene, without_past(point), point.time + ahead, number, value, rule="constant")
-    return replace(later, time=point.time, approach=point.approach, previous=point.previous)
+    return replace(point, stored_pressure=later.stored_pressure, force=later.force, solver_error=later.solver_error)
 
 
 def after_steps(
@@ -700,7 +697,7 @@ def pair_of_cells(scene: Scene, state: State, slide: Slide) -> list[Step]:
         coarse_end = over(coarse, count, last.time, around_coarse(last, coarse, fine))
 
     is_kept = any(scene.keeps(point.time) for point in points[1:])
-    error = difference(scene, fine, last, coarse_end, slide, is_kept=is_kept)
+    error = stated_difference(scene, fine, last, coarse_end, slide, is_kept=is_kept)
     relaxed = memory.remaining(last.time - fine.time)
     shared = 0.0
     if count == 1 and not memory.is_elastic:  # the coarse solution takes the same step: both share its error
@@ -817,7 +814,7 @@ def take_step(
     target: dict[str, Any] = {"load": value / area} if by_load else {"approach": value}
     guess = first_guess(candidates, prediction, gap, **target)
     if by_load:  # the solver takes pressures over the contact modulus, which is 1 / alpha here
-        target["load"] *= alpha
+        target = {"load": value / area * alpha}
     try:
         contact = solve_contact(
             grid, gap, tolerance=tolerance, **guess, **target, overwrite=True, present=scene.present

@@ -13,7 +13,7 @@ The method is constrained conjugate gradients on an evolving contact area [1]_. 
    preconditioned residual estimates this error.
 4. A step that does not descend is shortened, and finally replaced by a projected-gradient step, which always descends.
    A projected-gradient step is also taken if the duality gap has not halved in 30 iterations.
-5. Without a first guess, under a load and from 256 cells a side, the contact is solved on half the cells first.
+5. Without a first guess, under a load and from 256 cells a side, the contact is solved on cells twice as long first.
 6. From 768 cells a side the preconditioner has a second level for contact in many small spots.
 7. Under periodic boundaries a uniform pressure does not displace a half-space. A given approach therefore needs a
    separate check of the load near full contact.
