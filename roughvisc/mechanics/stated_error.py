@@ -116,7 +116,7 @@ class StepErrors:
             force=max(self.force, lasting * former.force),
             approach=max(self.approach, LASTING * former.approach),
             friction=max(self.friction, max(left, left_of_friction) * former.friction),  # both solutions may share it
-            shared=self.shared + left * former.shared,
+            shared=self.shared + (0.0 if is_soft else left * former.shared),
             gap=max(self.gap, LASTING * former.gap),
         )
 
@@ -203,7 +203,7 @@ def stated_difference(
         uncertain += PRESSURE_OF_LATE * float(outside.sum()) * fine.size / cells
     return replace(
         error,
-        pressure=error.pressure + uncertain,
+        shared=uncertain,
         inside=grid.cell_area * float(inside.sum()),
         outside=grid.cell_area * float(outside.sum()),
     )

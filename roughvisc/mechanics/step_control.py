@@ -290,10 +290,7 @@ def errors_over_allowed(
     scales = max(scales[0], scene.tolerance * largest.force), scales[1]
     ratio = added_error(scene, pair, number, next_row, scales) / (allowed * scene.tolerance)
     if max(ratio, error.shared / force / (allowed * scene.tolerance)) <= 1:  # the errors are from before the pair
-        of_approach = 0.0
-        # the pressure of a soft body jumps in a cell that enters: this error is new
-        entered = (pair.end.contact | pair.coarse_end.contact) & ~pair.start.contact
-        of_pressure = of_pressure if pair.has_final_pressure and bool(entered.any()) else 0.0
+        of_pressure = of_approach = 0.0
     return ratio, max(of_pressure, of_approach) / scene.tolerance
 
 

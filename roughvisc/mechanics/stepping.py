@@ -422,20 +422,16 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
         # if no times are given, the end of each pair is a row
         times = (last,) if scene.kept is None else scene.kept_within(start.time, last)
         pair = solve_pair(scene, state, middle, last, has_row=bool(times))
-        slide = scene.motions[number] if times else None
-        error = stated_difference(scene, start, pair.end, pair.coarse_end, slide, is_kept=bool(times))
-        # Only pairs with a kept row add to the shared error. If all pairs did, contacts with entering cells would state
-        # 9 % more, and as many rows would be beyond the tolerance.
-        if times and not pair.is_soft:
-            entered = force_of_entered(scene, start, pair.second)
-            error = replace(error, shared=shared_part(scene.memory, pair.length) * entered)
+        error = error_at_end(scene, pair, scene.motions[number])
         if scene.time_step is not None:
             next_length = length
             break
         ratios = errors_over_allowed(scene, pair, number, error, state.errors, largest)
         # where a cell is in contact in one solution only, their difference grows however short the pair is
         if ratios[0] > 1 and bool((start.contact != pair.coarse_start.contact).any()):
-            ratios = min(ratios, errors_of_pair_alone(scene, pair, number, error, state.errors, largest))
+            alone = without_former_difference(scene, pair, number)
+            error_alone = error_at_end(scene, alone)
+            ratios = min(ratios, errors_over_allowed(scene, alone, number, error_alone, state.errors, largest))
         loses_contact = not start.is_open and (pair.first.is_open or pair.second.is_open)
         opens = not by_load and loses_contact and pair.second.approach >= start.approach
         again, proposed = controller.judge(pair.length, *ratios, opens=opens)
@@ -484,15 +480,25 @@ def coarse_solution(
     return step, with_final_pressure(scene, coarse, step, number) if needs_pressure else step
 
 
-def errors_of_pair_alone(
-    scene: Scene, pair: Pair, number: int, error: StepErrors, former: StepErrors, largest: Largest
-) -> tuple[float, float]:
-    """Return the same as :func:`errors_over_allowed`, for a coarse solution that starts from the fine one."""
+def error_at_end(scene: Scene, pair: Pair, slide: Slide | None = None) -> StepErrors:
+    """Return the stated errors at the end of a pair without those from before; of the friction too, if it slides."""
+    error = stated_difference(
+        scene, pair.start, pair.end, pair.coarse_end, slide if pair.has_row else None, is_kept=pair.has_row
+    )
+    # Only pairs with a kept row add to the shared error. If all pairs did, contacts with entering cells would state
+    # 9 % more, and as many rows would be beyond the tolerance.
+    if pair.has_row and not pair.is_soft:
+        entered = force_of_entered(scene, pair.start, pair.second)
+        error = replace(error, shared=shared_part(scene.memory, pair.length) * entered)
+    return error
+
+
+def without_former_difference(scene: Scene, pair: Pair, number: int) -> Pair:
+    """Return a pair whose coarse solution starts from the fine one: their difference arises in the pair."""
     start = pair.start
     needs_pressure = pair.is_soft and pair.has_row
     step, end = coarse_solution(scene, start, start, pair.second, number, needs_pressure=needs_pressure)
-    alone = replace(pair, coarse_start=start, coarse_step=step, coarse_end=end)
-    return errors_over_allowed(scene, alone, number, error, former, largest)
+    return replace(pair, coarse_start=start, coarse_step=step, coarse_end=end)
 
 
 def accepted(
