@@ -239,11 +239,10 @@ def errors_over_allowed(
     """Return the error that a pair adds at the next kept time, over the allowed error, and the error at its end.
 
     If the pair has a kept row, its end counts as the next kept time. The error at the end is relative to the tolerance,
-    and zero if the end is not kept, or if the pair is short or adds little; but if a cell of a soft body enters, its
-    pressure counts. Errors are relative to the largest force and approach of the kept rows, of the pair, and of the
-    next row as far as it is known. While the approach is held, they are relative to the largest force of the kept rows
-    and the force that relaxation leaves until the next one. The force is at least the tolerance times the largest force
-    of all steps.
+    and zero if the end is not kept, or the pair is short or adds little. Errors are relative to the largest force and
+    approach of the kept rows, of the pair, and of the next row as far as it is known. While the approach is held, they
+    are relative to the largest force of the kept rows and the force that relaxation leaves until the next one. The
+    force is at least the tolerance times the largest force of all steps.
 
     Parameters
     ----------
@@ -270,7 +269,7 @@ def errors_over_allowed(
     if scene.keeps(second.time) and taken > FIRST_PAIR * (second.time - scene.program.corners[number]):
         # Most bodies state a part of the difference. The whole difference is compared with the tolerance, because rows
         # also state the errors of solver and series. The stated error of the pressure may be larger, and counts then.
-        shared = error.shared + former.shared * scene.memory.remaining(taken)
+        shared = error.shared + (0.0 if pair.is_soft else former.shared * scene.memory.remaining(taken))
         force_at_end = max(largest.kept_force, second.size, scene.least_force)
         approach_at_end = max(largest.approach, abs(second.approach), least)
         of_pressure = max(error.pressure / factor, error.pressure + shared) / force_at_end
