@@ -74,10 +74,9 @@ class StepErrors:
     friction : float
         Error of the friction force of a slide. [N]
     shared : float
-        Further error of the pressure, which the difference does not contain: of cells that have entered, as both
-        solutions share it (:func:`shared_part`), of rows inside pairs (:func:`stated_inside`), of cells of a soft body
-        that may have entered late (:func:`error_of_late_entry`), and of slides by one cell. `pressure` does not contain
-        it. [N]
+        Further error of the pressure, which both solutions may share and `pressure` does not contain: of cells that
+        have entered, or may have (:func:`shared_part`, :func:`uncertain_part`, :func:`error_of_late_entry`), and of
+        slides by one cell. [N]
     gap : float
         Error of the gap of a soft body. [m]
     """
@@ -94,9 +93,9 @@ class StepErrors:
     def at_least(
         self, former: StepErrors, left: float, left_of_friction: float = 0.0, *, is_soft: bool = False
     ) -> StepErrors:
-        """Return the errors, each at least a part of the error before a pair; both shared errors add up.
+        """Return the errors, each at least a part of the error before a pair.
 
-        Uncertain areas before the pair do not count.
+        Shared errors add up, but a soft body forgets those before the pair. Uncertain areas before it do not count.
 
         Parameters
         ----------
@@ -265,9 +264,8 @@ def stated_inside(
 ) -> StepErrors:
     """Return the stated errors of a row inside a pair, where no coarse solution exists.
 
-    They are the larger ones of both ends of the pair, except the shared error: it is the uncertain pressure of entered
-    cells. At the end of the pair the difference contains this pressure if the pair is soft; otherwise only the shared
-    part counts there.
+    They are the larger ones of both ends of the pair, except the shared error: it is the uncertain pressure of cells
+    that have entered until the row; in a soft pair at least that at the end of the pair (:func:`stated_difference`).
 
     Parameters
     ----------
@@ -279,11 +277,9 @@ def stated_inside(
     step = point.time - start.time
     left = 1.0 if is_soft else scene.memory.remaining(step)
     entered = force_of_entered(scene, start, point)
-    uncertain = 0.0
-    if entered:
-        uncertain = uncertain_part(scene.memory, step) * entered
-        uncertain = uncertain if is_soft else max(uncertain, shared_part(scene.memory, step) * entered)
-    error = replace(stated.or_larger(former, left), shared=uncertain)
+    shared = stated.shared if is_soft else shared_part(scene.memory, step) * entered
+    shared = max(shared, uncertain_part(scene.memory, step) * entered)
+    error = replace(stated.or_larger(former, left), shared=shared)
     # changes only the friction, and adds the remaining former shared error
     return with_former(scene, start, point, error, former, slide, is_soft=is_soft)
 

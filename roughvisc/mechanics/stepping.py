@@ -150,7 +150,7 @@ class Step(NamedTuple):
     Attributes
     ----------
     point : Point
-        Fine solution. A soft step that is not kept has the pressure of the whole step, any other that at its end.
+        Fine solution, with the pressure at its time; in a soft pair without a kept row with that of the whole step.
     errors : StepErrors
         Error of the time steps.
     segment : int
@@ -427,7 +427,8 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
             next_length = length
             break
         ratios = errors_over_allowed(scene, pair, number, error, state.errors, largest)
-        # where a cell is in contact in one solution only, their difference grows however short the pair is
+        # Where a cell is in contact in one solution only, their difference grows however short the pair is. The pair
+        # is then judged alone, by the difference that arises in it; the rows state the whole difference.
         if ratios[0] > 1 and bool((start.contact != pair.coarse_start.contact).any()):
             alone = without_former_difference(scene, pair, number)
             error_alone = error_at_end(scene, alone)
@@ -476,12 +477,16 @@ def coarse_solution(
     """
     candidates = around_coarse(second, coarse, start)
     solver_part = END_STEP if needs_pressure else SOLVER_PART
-    step = take_step(scene, coarse, second.time, number, candidates=candidates, solver_part=solver_part)
-    return step, with_final_pressure(scene, coarse, step, number) if needs_pressure else step
+    point = take_step(scene, coarse, second.time, number, candidates=candidates, solver_part=solver_part)
+    return point, with_final_pressure(scene, coarse, point, number) if needs_pressure else point
 
 
 def error_at_end(scene: Scene, pair: Pair, slide: Slide | None = None) -> StepErrors:
-    """Return the stated errors at the end of a pair without those from before; of the friction too, if it slides."""
+    """Return the stated errors at the end of a pair from the difference of both solutions, which is of the whole run.
+
+    They may be smaller than what is left of the errors before the pair (:func:`with_former`). A motion `slide` asks for
+    the error of the friction force.
+    """
     error = stated_difference(
         scene, pair.start, pair.end, pair.coarse_end, slide if pair.has_row else None, is_kept=pair.has_row
     )
@@ -497,8 +502,8 @@ def without_former_difference(scene: Scene, pair: Pair, number: int) -> Pair:
     """Return a pair whose coarse solution starts from the fine one: their difference arises in the pair."""
     start = pair.start
     needs_pressure = pair.is_soft and pair.has_row
-    step, end = coarse_solution(scene, start, start, pair.second, number, needs_pressure=needs_pressure)
-    return replace(pair, coarse_start=start, coarse_step=step, coarse_end=end)
+    point, end = coarse_solution(scene, start, start, pair.second, number, needs_pressure=needs_pressure)
+    return replace(pair, coarse_start=start, coarse_step=point, coarse_end=end)
 
 
 def accepted(
@@ -549,11 +554,11 @@ def accepted(
         entered=last_entered(scene, pair, state.entered, stated.gap),
     )
 
-    def with_late_entry(error: StepErrors, point: Point) -> StepErrors:
+    def with_late_entry(errors: StepErrors, point: Point) -> StepErrors:
         if not pair.is_soft:
-            return error
+            return errors
         uncertain = error_of_late_entry(scene, start, point, stated.gap, state.entered)
-        return replace(error, shared=max(error.shared, uncertain))
+        return replace(errors, shared=max(errors.shared, uncertain))
 
     steps = []
     of_work = max(state.work_difference, after.work_difference, key=abs)

@@ -121,9 +121,10 @@ def test_all_steps_as_rows__cost_little_more_than_fifty_rows(surface, body, prog
     assert all_steps < 2.5 * fifty
 
 
-def test_last_row_of_a_soft_body__is_repeated_if_a_cell_enters_before_it():
-    """The pressure of a cell that has just entered is uncertain: one pair would state five tolerances."""
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
+def test_entry_of_a_cell_into_a_soft_body__is_uncertain_only_then(tolerance):
+    """A pair in which a cell enters just before the last row is repeated, and later rows do not state the entry."""
     program = rv.Program().load(0.1, over=1)
     ball, body = rv.sphere(1.0, 1.6, (17, 15)), rv.kelvin_voigt(1.0, 1.0)
-    ds = rv.simulate(ball, body, program, tolerance=1e-2, fields=(), edge="accept", progress=False)
-    assert float(ds.stated_error[-1]) < 1e-2
+    ds = rv.simulate(ball, body, program, tolerance=tolerance, fields=(), edge="accept", progress=False)
+    assert float(ds.stated_error[-1]) < tolerance
