@@ -187,6 +187,24 @@ class Controller:
         return None, max(taken * min(max(factor, SHRINK), largest), self.shortest)
 
 
+class Ratios(NamedTuple):
+    """Errors of a pair.
+
+    Attributes
+    ----------
+    added : float
+        Error that the pair adds at the next kept time, over the allowed error.
+    at_row : float
+        Error at the end, over the tolerance, if the pair may be repeated for its row; otherwise zero.
+    is_resolved : bool
+        Whether the added error exceeds that of the contact solver.
+    """
+
+    added: float
+    at_row: float
+    is_resolved: bool
+
+
 def first_length(scene: Scene, segment: Segment, jumped: bool) -> float:
     """Return the length of the first pair of a segment; `jumped` is whether a contact has jumped before it. [s]"""
     length = FIRST_PAIR * min(segment.duration, segment.period)
@@ -235,7 +253,7 @@ def pair_ends(scene: Scene, number: int, now: float, length: float, *, is_first:
 
 def errors_over_allowed(
     scene: Scene, pair: Pair, number: int, error: StepErrors, former: StepErrors, largest: Largest
-) -> tuple[float, float]:
+) -> Ratios:
     """Return the error that a pair adds at the next kept time, over the allowed error, and the error at its end.
 
     If the pair has a kept row, its end counts as the next kept time. The error at the end is relative to the tolerance,
@@ -287,10 +305,12 @@ def errors_over_allowed(
         allowed = min(allowed, max(ALLOWED_IN_HOLD * share, LEAST_SHARE * allowed))
     # When surfaces have just touched again, the force is smaller than the errors from before: do not resolve it.
     scales = max(scales[0], scene.tolerance * largest.force), scales[1]
-    ratio = added_error(scene, pair, number, next_row, scales) / (allowed * scene.tolerance)
+    added = added_error(scene, pair, number, next_row, scales)
+    solved = max(second.solver_error, pair.coarse_step.solver_error) * second.size / scales[0]
+    ratio = added / (allowed * scene.tolerance)
     if max(ratio, error.shared / force / (allowed * scene.tolerance)) <= 1:  # the errors are from before the pair
         of_pressure = of_approach = 0.0
-    return ratio, max(of_pressure, of_approach) / scene.tolerance
+    return Ratios(ratio, max(of_pressure, of_approach) / scene.tolerance, added > solved)
 
 
 def least_approach(scene: Scene, time: float, force: float) -> float:
