@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from roughvisc.mechanics.memory import LARGEST_GROWTH
 from roughvisc.mechanics.program import Segment
@@ -409,9 +411,9 @@ def added_error(scene: Scene, pair: Pair, number: int, next_row: float, scales: 
     from the part that relaxation leaves of this value, whichever is smaller. If the pair is soft and has a kept row, it
     is at most the difference at the end: the pressure of a soft step is that of the whole step, not that of the row.
 
-    Under a load the change of the approach counts, unless its difference falls without a change of sign. These errors
-    do not fade, and those of pairs add up: if the error stated before the pair exceeds the tolerance, the error of the
-    pair counts as many times, at most `REJECTED` times.
+    Of approach and surface, a difference that falls without a change of sign is no error. Errors of the approach under
+    a load do not fade, and those of pairs add up: if the error stated before the pair exceeds the tolerance, the error
+    of the pair counts as many times, at most `REJECTED` times.
 
     Parameters
     ----------
@@ -450,11 +452,17 @@ def added_error(scene: Scene, pair: Pair, number: int, next_row: float, scales: 
     if by_load:
         before = pair.start.approach - pair.coarse_start.approach
         after = second.approach - coarse.approach
-        of_approach = max(abs(after) - abs(before), 0.0) if after * before > 0 else abs(after - before)
+        of_approach = float(grown(after, before))
         multiple = factor_of_approach * abs(before) / scales[1] / scene.tolerance
         error = max(error, of_approach / scales[1] * min(max(multiple, 1.0), REJECTED))
     if not by_load or second.is_open or is_soft:
-        surface = memory.displacement(second.history)[0] - memory.displacement(coarse.history)[0]
-        surface -= memory.displacement(pair.start.history)[0] - memory.displacement(pair.coarse_start.history)[0]
-        error = max(error, float(abs(surface).max()) / scales[1] * (1.0 if is_soft or receding else remains))
+        surfaces = memory.displacement(second.history)[0] - memory.displacement(coarse.history)[0]
+        former = memory.displacement(pair.start.history)[0] - memory.displacement(pair.coarse_start.history)[0]
+        of_surface = float(grown(surfaces, former, scene.grid.xp).max())
+        error = max(error, of_surface / scales[1] * (1.0 if is_soft or receding else remains))
     return error
+
+
+def grown(after: Any, before: Any, xp: Any = np) -> Any:
+    """Return the growth of differences, and their change where the sign has changed; of numbers or arrays."""
+    return xp.where(after * before > 0, xp.maximum(abs(after) - abs(before), 0.0), abs(after - before))
