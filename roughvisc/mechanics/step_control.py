@@ -107,6 +107,10 @@ class Pair:
         """Whether the pressure at the end is another one than that of the last step."""
         return self.end is not self.second
 
+    def unsolved(self) -> float:
+        """Return the error of the contact solver at the end: sum of the pressure error over the cells. [Pa]"""
+        return max(self.second.solver_error, self.coarse_step.solver_error) * float(self.second.pressure.sum())
+
     def receding(self) -> bool:
         """Return whether cells have left the contact."""
         return bool((self.start.contact & ~self.second.contact).any())
@@ -189,24 +193,6 @@ class Controller:
         return None, max(taken * min(max(factor, SHRINK), largest), self.shortest)
 
 
-class Ratios(NamedTuple):
-    """Errors of a pair.
-
-    Attributes
-    ----------
-    added : float
-        Error that the pair adds at the next kept time, over the allowed error.
-    at_row : float
-        Error at the end, over the tolerance, if the pair may be repeated for its row; otherwise zero.
-    is_resolved : bool
-        Whether the added error exceeds that of the contact solver.
-    """
-
-    added: float
-    at_row: float
-    is_resolved: bool
-
-
 def first_length(scene: Scene, segment: Segment, jumped: bool) -> float:
     """Return the length of the first pair of a segment; `jumped` is whether a contact has jumped before it. [s]"""
     length = FIRST_PAIR * min(segment.duration, segment.period)
@@ -255,7 +241,7 @@ def pair_ends(scene: Scene, number: int, now: float, length: float, *, is_first:
 
 def errors_over_allowed(
     scene: Scene, pair: Pair, number: int, error: StepErrors, former: StepErrors, largest: Largest
-) -> Ratios:
+) -> tuple[float, float]:
     """Return the error that a pair adds at the next kept time, over the allowed error, and the error at its end.
 
     If the pair has a kept row, its end counts as the next kept time. The error at the end is relative to the tolerance,
@@ -307,12 +293,23 @@ def errors_over_allowed(
         allowed = min(allowed, max(ALLOWED_IN_HOLD * share, LEAST_SHARE * allowed))
     # When surfaces have just touched again, the force is smaller than the errors from before: do not resolve it.
     scales = max(scales[0], scene.tolerance * largest.force), scales[1]
-    added = added_error(scene, pair, number, next_row, scales)
-    solved = max(second.solver_error, pair.coarse_step.solver_error) * second.size / scales[0]
-    ratio = added / (allowed * scene.tolerance)
+    ratio = added_error(scene, pair, number, next_row, scales) / (allowed * scene.tolerance)
     if max(ratio, error.shared / force / (allowed * scene.tolerance)) <= 1:  # the errors are from before the pair
         of_pressure = of_approach = 0.0
-    return Ratios(ratio, max(of_pressure, of_approach) / scene.tolerance, added > solved)
+    return ratio, max(of_pressure, of_approach) / scene.tolerance
+
+
+def arises_before(scene: Scene, pair: Pair) -> bool:
+    """Return whether the change of the difference between both solutions may be due to an error before a pair.
+
+    - A cell is in contact in one solution only: the difference grows however short the pair is.
+    - The change is within the error of the contact solver: it may alternate.
+    - Relaxation may reduce the difference before the pair by as much.
+    """
+    former = pair.start.pressure - pair.coarse_start.pressure
+    change = float(abs(pair.second.pressure - pair.coarse_step.pressure - former).sum())
+    faded = (1 - scene.memory.remaining(pair.length)) * float(abs(former).sum())
+    return change <= max(faded, pair.unsolved()) or bool((pair.start.contact != pair.coarse_start.contact).any())
 
 
 def least_approach(scene: Scene, time: float, force: float) -> float:
@@ -448,6 +445,8 @@ def added_error(scene: Scene, pair: Pair, number: int, next_row: float, scales: 
             ahead = next_row - pair.first.time
             left = memory.remaining(taken / 2)
         remains = max(memory.remaining(ahead) / left if left > 0 else 0.0, LEAST_REMAINING)
+    if pair.coarse_start is pair.start and change <= pair.unsolved():
+        change = 0.0  # shorter steps would not reduce the error of the contact solver
     error = change * scene.grid.cell_area / scales[0] * remains
     if by_load:
         before = pair.start.approach - pair.coarse_start.approach

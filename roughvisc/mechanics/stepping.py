@@ -57,6 +57,7 @@ from roughvisc.mechanics.step_control import (
     Controller,
     Largest,
     Pair,
+    arises_before,
     errors_over_allowed,
     first_length,
     pair_ends,
@@ -427,17 +428,13 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
             next_length = length
             break
         ratios = errors_over_allowed(scene, pair, number, error, state.errors, largest)
-        # Where a cell is in contact in one solution only, their difference grows however short the pair is. Where it is
-        # within the error of the contact solver, it may alternate. The pair is then judged alone, by the difference
-        # that arises in it; the rows state the whole difference.
-        meet = not bool((start.contact != pair.coarse_start.contact).any())
-        if ratios.added > 1 and not (meet and ratios.is_resolved):
+        if ratios[0] > 1 and arises_before(scene, pair):  # judge what arises in the pair; rows state the whole error
             alone = without_former_difference(scene, pair, number)
             error_alone = error_at_end(scene, alone)
             ratios = min(ratios, errors_over_allowed(scene, alone, number, error_alone, state.errors, largest))
         loses_contact = not start.is_open and (pair.first.is_open or pair.second.is_open)
         opens = not by_load and loses_contact and pair.second.approach >= start.approach
-        again, proposed = controller.judge(pair.length, ratios.added, ratios.at_row, opens=opens)
+        again, proposed = controller.judge(pair.length, *ratios, opens=opens)
         if again is None:
             next_length = proposed
             break

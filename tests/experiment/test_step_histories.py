@@ -111,6 +111,12 @@ ROUGH = rv.self_affine((1.1, 1.05), (18, 15), hurst=0.8, rms_height=0.04, shortc
             id="error_of_the_approach_fades",
         ),
         pytest.param(
+            rv.flat_punch(1.0, 2.6, 13),
+            rv.power_law(0.0, 3.5e-3, 0.2, 1.0),
+            rv.Program().load(1.0, over=0.3).hold(1.0),
+            id="error_of_the_surface_fades",
+        ),
+        pytest.param(
             ROUGH, rv.kelvin_voigt(1.0, 1.0), rv.Program().load(0.1, over=1).load(0.03, over=1), id="cells_enter"
         ),
     ],
@@ -119,6 +125,21 @@ def test_all_steps_as_rows__cost_little_more_than_fifty_rows(surface, body, prog
     every = [program.duration * number / 50 for number in range(1, 51)]
     all_steps, fifty = (convolutions_and_pairs(surface, body, program, times, 1e-2)[0] for times in (None, every))
     assert all_steps < 2.5 * fifty
+
+
+@pytest.mark.parametrize("height", [0.04, 0.01])
+def test_one_row_after_a_long_relaxation__costs_no_more_than_fifty(height):
+    """The force falls 200 times. Steps need not resolve the error of the contact solver, nor one that fades."""
+    rough = rv.self_affine((1.1, 1.05), (18, 15), hurst=0.8, rms_height=height, shortcut=0.35, seed=5)
+    program = rv.Program().approach(1.5 * height, over=0.046).hold(2.0)
+
+    def pairs(rows):
+        times = [program.duration * number / rows for number in range(1, rows + 1)]
+        settings = {"times": times, "boundary": "periodic", "fields": (), "grid_error": False, "progress": False}
+        ds = rv.simulate(rough, rv.power_law(0.01, 1.0, 0.8, 1.0), program, **settings)
+        return rv.observables.history(ds).sizes["time"]
+
+    assert pairs(1) < 2 * pairs(50)
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
