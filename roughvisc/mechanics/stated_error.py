@@ -106,7 +106,7 @@ class StepErrors:
         left_of_friction : float
             Part of the friction force that is left, see :func:`left_of_friction`.
         is_soft : bool
-            Whether the pair is soft: errors of pressure and force follow from that of the surface, and do not fade.
+            Whether the pair is soft: errors of pressure and force follow from errors of the surface, which do not fade.
         """
         lasting = LASTING if is_soft else LASTING * left
         return replace(

@@ -104,7 +104,7 @@ class Pair:
 
     @property
     def has_final_pressure(self) -> bool:
-        """Whether the pressure at the end is another one than that of the last step."""
+        """Whether the end has another pressure than the last step."""
         return self.end is not self.second
 
     def unsolved(self) -> float:
@@ -406,10 +406,11 @@ def added_error(scene: Scene, pair: Pair, number: int, next_row: float, scales: 
 
     The error is the change of the difference between both solutions over the pair, from its value before the pair or
     from the part that relaxation leaves of this value, whichever is smaller. If the pair is soft and has a kept row, it
-    is at most the difference at the end: the pressure of a soft step is that of the whole step, not that of the row.
+    is at most the difference at the end, because a soft step has one pressure for the whole step. If both solutions are
+    equal before the pair, the pressures differ by more than the error of the contact solver, or not at all.
 
-    Of approach and surface, a difference that falls without a change of sign is no error. Errors of the approach under
-    a load do not fade, and those of pairs add up: if the error stated before the pair exceeds the tolerance, the error
+    Differences of approach and surface count if they grow or change their sign. Errors of the approach under a load do
+    not fade, and the errors of all pairs add up: if the error stated before the pair exceeds the tolerance, the error
     of the pair counts as many times, at most `REJECTED` times.
 
     Parameters

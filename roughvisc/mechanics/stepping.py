@@ -3,8 +3,9 @@
 :func:`march` proceeds by pairs of steps. The fine solution takes both steps. The coarse solution takes the pair as one
 step, and continues from its own end: the difference of both solutions comes from the whole run so far. It gives the
 stated error (:mod:`roughvisc.mechanics.stated_error`), and its change over the pair controls the length of the next
-pair (:mod:`roughvisc.mechanics.step_control`). A kept time inside a pair does not cut it: the row there is one more
-step, from the point before it (:func:`row_inside`).
+pair (:mod:`roughvisc.mechanics.step_control`). If an error from before the pair may cause this change, the coarse step
+is repeated from the fine solution, and the difference then controls the length. A kept time inside a pair does not cut
+it: the row there is one more step, from the point before it (:func:`row_inside`).
 
 Errors are weighted by the part that relaxation leaves until the next kept time (:meth:`Memory.remaining`).
 
@@ -151,7 +152,7 @@ class Step(NamedTuple):
     Attributes
     ----------
     point : Point
-        Fine solution, with the pressure at its time; in a soft pair without a kept row with that of the whole step.
+        Fine solution, with the pressure at its time; a soft pair without a kept row has the pressures of whole steps.
     errors : StepErrors
         Error of the time steps.
     segment : int
@@ -483,8 +484,8 @@ def coarse_solution(
 def error_at_end(scene: Scene, pair: Pair, slide: Slide | None = None) -> StepErrors:
     """Return the stated errors at the end of a pair from the difference of both solutions, which is of the whole run.
 
-    They may be smaller than what is left of the errors before the pair (:func:`with_former`). A motion `slide` asks for
-    the error of the friction force.
+    The errors left from before the pair may be larger (:func:`with_former`). A motion `slide` asks for the error of the
+    friction force.
     """
     error = stated_difference(
         scene, pair.start, pair.end, pair.coarse_end, slide if pair.has_row else None, is_kept=pair.has_row
