@@ -288,7 +288,7 @@ def error_of_late_entry(scene: Scene, before: Point, after: Point, error: float,
     """Return the error of the pressure of a soft body due to cells that may not have entered the contact yet. [N]
 
     The pressure of a soft body jumps when a cell enters, which it may do at any approach within the error of the gap.
-    Until the approach has changed by more, a row may lie before the true jump.
+    Until the approach has changed by more, a row may lie before the true jump; and after it, if the gap is smaller.
 
     Parameters
     ----------
@@ -304,6 +304,13 @@ def error_of_late_entry(scene: Scene, before: Point, after: Point, error: float,
     force = former[0] if abs(after.approach - former[1]) <= error else 0.0
     if abs(after.approach - before.approach) <= error:
         force += force_of_entered(scene, before, after)
+    gap = scene.gap + scene.memory.displacement(after.history)[0] - after.approach
+    near = ~after.contact & (gap <= error)
+    if scene.present is not None:
+        near &= scene.present
+    cells = int(after.contact.sum())
+    if cells:
+        force += PRESSURE_OF_LATE * float(near.sum()) * after.size / cells
     return 2 * force  # other cells carry what these do not
 
 
