@@ -123,7 +123,7 @@ class Largest(NamedTuple):
     kept_force : float
         Largest force of the kept rows so far, of all steps if no times are given. [N]
     approach : float
-        Largest approach of the same rows; a prescribed approach, which states no error, of all steps. [m]
+        Under a load: largest approach of the kept rows; under an approach, which mostly is exact: of all steps. [m]
     force : float
         Largest force of all steps. [N]
     peak : tuple of float
@@ -268,7 +268,7 @@ def errors_over_allowed(
     least = least_approach(scene, second.time, force)
     approach = max(largest.approach, abs(pair.first.approach), abs(second.approach), least)
 
-    of_pressure = of_approach = 0.0  # at the row
+    of_pressure = of_approach = 0.0  # at the end, if it is a row
     factor, factor_of_approach = stated_over_difference(scene)
     # a pair that is short for its place in the segment is not repeated: see FIRST_PAIR
     if scene.keeps(second.time) and taken > FIRST_PAIR * (second.time - scene.program.corners[number]):

@@ -430,9 +430,7 @@ def pair_of_steps(scene: Scene, state: State, segment: Segment) -> list[Step]:
             break
         ratios = errors_over_allowed(scene, pair, number, error, state.errors, largest)
         if ratios[0] > 1 and arises_before(scene, pair):  # judge what arises in the pair; rows state the whole error
-            alone = without_former_difference(scene, pair, number)
-            error_alone = error_at_end(scene, alone)
-            ratios = min(ratios, errors_over_allowed(scene, alone, number, error_alone, state.errors, largest))
+            ratios = min(ratios, errors_of_pair_alone(scene, pair, number, state.errors, largest))  # by the added error
         loses_contact = not start.is_open and (pair.first.is_open or pair.second.is_open)
         opens = not by_load and loses_contact and pair.second.approach >= start.approach
         again, proposed = controller.judge(pair.length, *ratios, opens=opens)
@@ -498,12 +496,15 @@ def error_at_end(scene: Scene, pair: Pair, slide: Slide | None = None) -> StepEr
     return error
 
 
-def without_former_difference(scene: Scene, pair: Pair, number: int) -> Pair:
-    """Return a pair whose coarse solution starts from the fine one: their difference arises in the pair."""
+def errors_of_pair_alone(
+    scene: Scene, pair: Pair, number: int, former: StepErrors, largest: Largest
+) -> tuple[float, float]:
+    """Return :func:`errors_over_allowed` for a coarse step that starts from the fine solution."""
     start = pair.start
     needs_pressure = pair.is_soft and pair.has_row
     point, end = coarse_solution(scene, start, start, pair.second, number, needs_pressure=needs_pressure)
-    return replace(pair, coarse_start=start, coarse_step=point, coarse_end=end)
+    alone = replace(pair, coarse_start=start, coarse_step=point, coarse_end=end)
+    return errors_over_allowed(scene, alone, number, error_at_end(scene, alone), former, largest)
 
 
 def accepted(
@@ -653,7 +654,7 @@ def after_steps(
     reached = replace(
         state,
         fine=fine,
-        coarse=None if coarse is fine else replace(coarse, previous=None),  # the coarse solution starts from others
+        coarse=None if coarse is fine else replace(coarse, previous=None),  # see `around_coarse`
         next_length=next_length,
         largest_force=max(state.largest_force, points[0].size, fine.size),
         largest_approach=max(state.largest_approach, abs(points[0].approach), abs(fine.approach)),
@@ -822,10 +823,10 @@ def take_step(
             by_load=by_load,
             may_refuse=may_refuse,
         )
-    target: dict[str, Any] = {"load": value / area} if by_load else {"approach": value}
-    guess = first_guess(candidates, prediction, gap, **target)
-    if by_load:  # the solver takes pressures over the contact modulus, which is 1 / alpha here
-        target = {"load": value / area * alpha}
+    given = {"load": value / area} if by_load else {"approach": value}
+    guess: dict[str, Any] = first_guess(candidates, prediction, gap, **given)
+    # the solver takes pressures over the contact modulus, which is 1 / alpha here
+    target: dict[str, Any] = {"load": value / area * alpha} if by_load else given
     try:
         contact = solve_contact(
             grid, gap, tolerance=tolerance, **guess, **target, overwrite=True, present=scene.present
