@@ -302,21 +302,25 @@ def arises_before(scene: Scene, pair: Pair) -> bool:
     """Return whether the change of the difference between both solutions may be due to an error before a pair.
 
     - A cell is in contact in one solution only: the difference grows however short the pair is.
-    - The change is within the error of the contact solver: it may alternate.
     - The difference of the approach falls.
-    - The pair is short for the time to the next kept row, and relaxation may reduce the difference by as much.
+    - That of the approach is constant, and the change of the pressures is within the error of the contact solver: it
+      may alternate.
+    - That of the approach is constant, the pair is short for the time to the next kept row, and relaxation may reduce
+      the difference of the pressures by as much.
     """
+    if bool((pair.start.contact != pair.coarse_start.contact).any()):
+        return True
     before = pair.start.approach - pair.coarse_start.approach
     after = pair.second.approach - pair.coarse_step.approach
-    if after * before > 0 and abs(after) < abs(before):
-        return True
+    if abs(after - before) > ROUNDED * abs(pair.second.approach):
+        return after * before > 0 and abs(after) < abs(before)
     former = pair.start.pressure - pair.coarse_start.pressure
     change = float(abs(pair.second.pressure - pair.coarse_step.pressure - former).sum())
     ahead = min(scene.next_kept(pair.second.time), scene.program.duration) - pair.second.time
     faded = 0.0
     if not pair.has_row and pair.length < FIRST_PAIR * ahead:
         faded = (1 - scene.memory.remaining(pair.length)) * float(abs(former).sum())
-    return change <= max(faded, pair.unsolved()) or bool((pair.start.contact != pair.coarse_start.contact).any())
+    return change <= max(faded, pair.unsolved())
 
 
 def least_approach(scene: Scene, time: float, force: float) -> float:
