@@ -93,9 +93,9 @@ class StepErrors:
     def at_least(
         self, former: StepErrors, left: float, left_of_friction: float = 0.0, *, is_soft: bool = False
     ) -> StepErrors:
-        """Return the errors, each at least a part of the error before a pair.
+        """Return the errors after a pair; none is smaller than a part of the error before the pair.
 
-        Shared errors add up, but a soft body forgets those before the pair. Uncertain areas before it do not count.
+        Shared errors add up, but a soft body forgets those before the pair. Earlier uncertain areas do not count.
 
         Parameters
         ----------
@@ -215,7 +215,7 @@ def uncertain_part(memory: Memory, step: float) -> float:
 
 
 def shared_part(memory: Memory, step: float) -> float:
-    """Return the relative error that both solutions share in the pressure of a cell that has entered within a pair."""
+    """Return the relative error of the pressure that both solutions share in cells that enter within a pair."""
     return min(SHARED * (memory.compliance(step) / memory.glassy - 1) ** 2, 1.0)
 
 
@@ -229,7 +229,7 @@ def with_former(
     *,
     is_soft: bool,
 ) -> StepErrors:
-    """Return the stated errors at a point of a pair, at least a part of those from before the pair.
+    """Return the stated errors at a point of a pair; none is smaller than a part of the error before the pair.
 
     Parameters
     ----------
@@ -264,8 +264,8 @@ def stated_inside(
 ) -> StepErrors:
     """Return the stated errors of a row inside a pair, where no coarse solution exists.
 
-    They are the larger ones of both ends of the pair, except the shared error: it is the uncertain pressure of cells
-    that have entered until the row; in a soft pair at least that at the end of the pair (:func:`stated_difference`).
+    Each is the larger one of both ends of the pair, except the shared error. The shared error is the uncertain pressure
+    of cells that have entered before the row; in a soft pair it is at least the shared error at the end of the pair.
 
     Parameters
     ----------
@@ -288,7 +288,7 @@ def error_of_late_entry(scene: Scene, before: Point, after: Point, error: float,
     """Return the error of the pressure of a soft body due to cells that may not have entered the contact yet. [N]
 
     The pressure of a soft body jumps when a cell enters, which it may do at any approach within the error of the gap.
-    Until the approach has changed by more, a row may lie before the true jump; and after it, if the gap is smaller.
+    A row just after the computed jump may lie before the true one, and a row just before the computed jump after it.
 
     Parameters
     ----------

@@ -19,8 +19,8 @@ from roughvisc.mechanics.stated_error import StepErrors, stated_over_difference
 
 #: Length of the first pair after a corner that is not smooth, as a part of the segment: contact changes fast there.
 #: Also the shortest pair that is repeated in halves because it misses the tolerance at a kept time, as a part of the
-#: time since the segment began; and the pair is short for the time to the next kept row if it is shorter than this
-#: part of it (:func:`arises_before`). With 0.005: 1.01, 0.99, 0.98; with 0.02: 1.03, 1.01, 0.99.
+#: time since the segment began. :func:`arises_before` calls a pair short if it is shorter than this part of the time to
+#: the next kept row. With 0.005: 1.01, 0.99, 0.98; with 0.02: 1.03, 1.01, 0.99.
 FIRST_PAIR = 0.01
 #: Growth of the compliance in the first pair after a jump. In a longer pair the pressure would relax far within a step,
 #: and both solutions would share an error of the slow exponentials: `closed_forms.py cells-one waves`, bad rows.
@@ -34,16 +34,16 @@ ALLOWED_SOFT = 0.17
 #: While the approach is held, the force relaxes as errors do, so that the errors of all pairs add up. All pairs until
 #: the next kept time may add this many times the tolerance, each its share in the logarithm of the relaxation; and a
 #: pair at least this part of what it may add elsewhere. The difference of both solutions counts, which is three times
-#: the error. Rows beyond the tolerance: 26 of 2,000; 24 when the others were measured. Without ALLOWED_IN_HOLD 78, for
-#: 0.80 of the convolutions; with 4: 49, for 0.93; with 1: 15, for 1.06. With LEAST_SHARE = 0.1: 14, for 1.31; with
-#: 0.5: 36, for 0.90 (`closed_forms.py cells-one --scenes 1000 --seed 777003`).
+#: the error. `closed_forms.py cells-one --scenes 1000 --seed 777003` has 26 of 2,000 rows beyond the tolerance. An
+#: earlier version had 24; without ALLOWED_IN_HOLD it had 78, for 0.80 of the convolutions; with 4: 49, for 0.93; with
+#: 1: 15, for 1.06; with LEAST_SHARE = 0.1: 14, for 1.31; with 0.5: 36, for 0.90.
 ALLOWED_IN_HOLD = 2.0
 LEAST_SHARE = 0.3
-#: Order of the error of a pair in its length, observed: cells enter and leave the contact within steps. With 2: 1.00,
-#: 1.01, 0.98, and 4 and 10 rows beyond instead of 3 and 7.
+#: Observed order of the error of a pair in its length; below 2 because cells enter and leave the contact within steps.
+#: With 2: 1.00, 1.01, 0.98, and 4 and 10 rows beyond the tolerance instead of 3 and 7.
 ORDER = 1.5
-#: Smallest ratio of the lengths of successive pairs. At least 0.5: 1.03, 1.01, 1.04. The largest ratio follows from
-#: LARGEST_GROWTH: a pair may end later than planned (SLACK).
+#: Smallest ratio of the lengths of successive pairs. With 0.5: 1.03, 1.01, 1.04. The largest ratio is LARGEST_GROWTH
+#: over 1 + SLACK, because a pair may end later than planned.
 SHRINK = 0.3
 #: Least part of an error that counts as remaining after relaxation, because other errors do not fade. With
 #: zero `closed_forms.py work-approach --seed 778` has 43 rows of 813 beyond the tolerance instead of 33.
@@ -103,11 +103,11 @@ class Pair:
 
     @property
     def has_final_pressure(self) -> bool:
-        """Whether the end has another pressure than the last step."""
+        """Whether the pressures at the end differ from those of the second step."""
         return self.end is not self.second
 
     def unsolved(self) -> float:
-        """Return the error of the contact solver at the end: sum of the pressure error over the cells. [Pa]"""
+        """Return the larger solver error of both solutions at the end, as a sum of pressures over the cells. [Pa]"""
         return max(self.second.solver_error, self.coarse_step.solver_error) * float(self.second.pressure.sum())
 
     def receding(self) -> bool:
@@ -290,7 +290,7 @@ def errors_over_allowed(
     if share < 1:
         scales = max(largest.kept_force, second.size * left, scene.least_force), scales[1]
         allowed = min(allowed, max(ALLOWED_IN_HOLD * share, LEAST_SHARE * allowed))
-    # When surfaces have just touched again, the force is smaller than the errors from before: do not resolve it.
+    # just after surfaces touch again, errors from before may exceed the force, and no step resolves it
     scales = max(scales[0], scene.tolerance * largest.force), scales[1]
     ratio = added_error(scene, pair, number, next_row, scales) / (allowed * scene.tolerance)
     if max(ratio, error.shared / force / (allowed * scene.tolerance)) <= 1:  # the errors are from before the pair
@@ -299,14 +299,16 @@ def errors_over_allowed(
 
 
 def arises_before(scene: Scene, pair: Pair) -> bool:
-    """Return whether the change of the difference between both solutions may be due to an error before a pair.
+    """Return whether an error from before a pair may explain how the difference of both solutions changes in it.
 
-    - A cell is in contact in one solution only: the difference grows however short the pair is.
-    - The difference of the approach falls.
-    - That of the approach is constant, and the change of the pressures is within the error of the contact solver: it
-      may alternate.
-    - That of the approach is constant, the pair is short for the time to the next kept row, and relaxation may reduce
-      the difference of the pressures by as much.
+    This is so in four cases:
+
+    - A cell is in contact in one solution only. The difference then grows, however short the pair is.
+    - The difference of the approaches falls.
+    - The difference of the approaches is constant, and that of the pressures changes by no more than the error of the
+      contact solver. The coarse solution may then alternate between two states.
+    - The difference of the approaches is constant, the pair is much shorter than the time to the next kept row, and
+      relaxation may change the difference of the pressures by as much.
     """
     if bool((pair.start.contact != pair.coarse_start.contact).any()):
         return True
@@ -417,8 +419,8 @@ def added_error(scene: Scene, pair: Pair, number: int, next_row: float, scales: 
 
     The error is the change of the difference between both solutions over the pair, from its value before the pair or
     from the part that relaxation leaves of this value, whichever is smaller. If the pair is soft and has a kept row, it
-    is at most the difference at the end, because a soft step has one pressure for the whole step. If both solutions are
-    equal before the pair, the pressures differ by more than the error of the contact solver, or not at all.
+    is at most the difference at the end, because a soft step has one pressure for the whole step. If both solutions
+    start from the same point, a difference of the pressures within the error of the contact solver does not count.
 
     Errors of the approach under a load do not fade, and the errors of all pairs add up: if the error stated before the
     pair exceeds the tolerance, the error of the pair counts as many times, at most `REJECTED` times.
@@ -461,8 +463,7 @@ def added_error(scene: Scene, pair: Pair, number: int, next_row: float, scales: 
     error = change * scene.grid.cell_area / scales[0] * remains
     if by_load:
         before = pair.start.approach - pair.coarse_start.approach
-        after = second.approach - coarse.approach
-        of_approach = abs(after - before)
+        of_approach = abs(second.approach - coarse.approach - before)
         multiple = factor_of_approach * abs(before) / scales[1] / scene.tolerance
         error = max(error, of_approach / scales[1] * min(max(multiple, 1.0), REJECTED))
     if not by_load or second.is_open or is_soft:

@@ -462,7 +462,7 @@ def solve_pair(scene: Scene, state: State, middle: float, last: float, *, has_ro
 def coarse_solution(
     scene: Scene, coarse: Point, start: Point, second: Point, number: int, *, needs_pressure: bool
 ) -> tuple[Point, Point]:
-    """Return the coarse solution after a pair: its step, and the same with the pressure at that time if it is needed.
+    """Return the coarse solution after a pair: as its step gives it, and with the pressure at that time if needed.
 
     Parameters
     ----------
@@ -480,16 +480,16 @@ def coarse_solution(
 
 
 def error_at_end(scene: Scene, pair: Pair, slide: Slide | None = None) -> StepErrors:
-    """Return the stated errors at the end of a pair from the difference of both solutions, which is of the whole run.
+    """Return the stated errors at the end of a pair, from the difference that both solutions have reached so far.
 
-    The errors left from before the pair may be larger (:func:`with_former`). A motion `slide` asks for the error of the
-    friction force.
+    Errors that are left from before the pair may be larger (:func:`with_former`). The error of the friction force is
+    stated if a motion `slide` is given.
     """
     error = stated_difference(
         scene, pair.start, pair.end, pair.coarse_end, slide if pair.has_row else None, is_kept=pair.has_row
     )
-    # Only pairs with a kept row add to the shared error. If all pairs did, contacts with entering cells would state
-    # 9 % more, and as many rows would be beyond the tolerance.
+    # Only pairs with a kept row add to the shared error. If all pairs did, rows of contacts with entering cells would
+    # state errors 9 % larger, and as many rows would be beyond the tolerance.
     if pair.has_row and not pair.is_soft:
         entered = force_of_entered(scene, pair.start, pair.second)
         error = replace(error, shared=shared_part(scene.memory, pair.length) * entered)
@@ -499,7 +499,7 @@ def error_at_end(scene: Scene, pair: Pair, slide: Slide | None = None) -> StepEr
 def errors_of_pair_alone(
     scene: Scene, pair: Pair, number: int, former: StepErrors, largest: Largest
 ) -> tuple[float, float]:
-    """Return :func:`errors_over_allowed` for a coarse step that starts from the fine solution."""
+    """Return the ratios of :func:`errors_over_allowed`, with a coarse step from the fine solution before the pair."""
     start = pair.start
     needs_pressure = pair.is_soft and pair.has_row
     point, end = coarse_solution(scene, start, start, pair.second, number, needs_pressure=needs_pressure)
@@ -825,7 +825,7 @@ def take_step(
         )
     given = {"load": value / area} if by_load else {"approach": value}
     guess: dict[str, Any] = first_guess(candidates, prediction, gap, **given)
-    # the solver takes pressures over the contact modulus, which is 1 / alpha here
+    # the solver divides pressures by the contact modulus, here 1 / alpha
     target: dict[str, Any] = {"load": value / area * alpha} if by_load else given
     try:
         contact = solve_contact(

@@ -82,10 +82,13 @@ def test_one_kept_row__takes_no_more_steps_than_many_where_the_force_vanishes(bo
     assert convolutions(1) < 2 * convolutions(40)
 
 
-def convolutions_and_pairs(surface, body, program, times, tolerance):
+def steps_of(surface, body, program, times, tolerance):
     numerics = {"tolerance": tolerance, "fields": (), "grid_error": False, "edge": "accept", "progress": False}
-    steps = rv.observables.history(rv.simulate(surface, body, program, times=times, **numerics))
-    return int(steps.convolutions.sum()), steps.sizes["time"]
+    return rv.observables.history(rv.simulate(surface, body, program, times=times, **numerics))
+
+
+def even(program, rows):
+    return [program.duration * number / rows for number in range(1, rows + 1)]
 
 
 def test_ball_that_touches_a_fluid_again__takes_more_steps_for_accuracy_only():
@@ -93,7 +96,7 @@ def test_ball_that_touches_a_fluid_again__takes_more_steps_for_accuracy_only():
     ball, fluid = rv.sphere(1.0, 1.6, (17, 15)), rv.Prony(1.0, 0.2, (1.0,), (1.0,))
     program = rv.Program().approach(0.3, over=0.1).hold(1.0).approach(0.15, over=0).hold(3.0)
     loose, sharp = (
-        convolutions_and_pairs(ball, fluid, program, [program.duration], tolerance)[1] for tolerance in (1e-2, 1e-3)
+        steps_of(ball, fluid, program, [program.duration], tolerance).sizes["time"] for tolerance in (1e-2, 1e-3)
     )
     assert sharp < 5 * loose  # an error of order 1.5 in the length
 
@@ -122,8 +125,9 @@ ROUGH = rv.self_affine((1.1, 1.05), (18, 15), hurst=0.8, rms_height=0.04, shortc
     ],
 )
 def test_all_steps_as_rows__cost_little_more_than_fifty_rows(surface, body, program):
-    every = [program.duration * number / 50 for number in range(1, 51)]
-    all_steps, fifty = (convolutions_and_pairs(surface, body, program, times, 1e-2)[0] for times in (None, every))
+    all_steps, fifty = (
+        int(steps_of(surface, body, program, times, 1e-2).convolutions.sum()) for times in (None, even(program, 50))
+    )
     assert all_steps < 2.5 * fifty
 
 
@@ -132,14 +136,9 @@ def test_one_row_after_a_long_relaxation__costs_no_more_than_fifty(height):
     """The force falls 200 times. Steps need not resolve the error of the contact solver, nor one that fades."""
     rough = rv.self_affine((1.1, 1.05), (18, 15), hurst=0.8, rms_height=height, shortcut=0.35, seed=5)
     program = rv.Program().approach(1.5 * height, over=0.046).hold(2.0)
-
-    def pairs(rows):
-        times = [program.duration * number / rows for number in range(1, rows + 1)]
-        settings = {"times": times, "boundary": "periodic", "fields": (), "grid_error": False, "progress": False}
-        ds = rv.simulate(rough, rv.power_law(0.01, 1.0, 0.8, 1.0), program, **settings)
-        return rv.observables.history(ds).sizes["time"]
-
-    assert pairs(1) < 2 * pairs(50)
+    law = rv.power_law(0.01, 1.0, 0.8, 1.0)
+    one, fifty = (steps_of(rough, law, program, even(program, rows), 1e-3).sizes["time"] for rows in (1, 50))
+    assert one < 2 * fifty
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
@@ -149,3 +148,14 @@ def test_entry_of_a_cell_into_a_soft_body__is_uncertain_only_then(tolerance):
     ball, body = rv.sphere(1.0, 1.6, (17, 15)), rv.kelvin_voigt(1.0, 1.0)
     ds = rv.simulate(ball, body, program, tolerance=tolerance, fields=(), edge="accept", progress=False)
     assert float(ds.stated_error[-1]) < tolerance
+
+
+def test_row_next_to_the_entry_of_a_cell_into_a_soft_body__states_the_jump():
+    """The pressure jumps there, before or after the computed instant."""
+    program = rv.Program().load(0.1, over=1)
+    ball, body = rv.sphere(1.0, 1.6, (17, 15)), rv.kelvin_voigt(1.0, 1.0)
+    settings = {"times": even(program, 801), "fields": ("pressure",), "edge": "accept", "progress": False}
+    rows, exact = (rv.simulate(ball, body, program, tolerance=tolerance, **settings) for tolerance in (1e-2, 5e-4))
+    off = abs(rows.pressure - exact.pressure).sum(("x", "y")) / exact.pressure.sum(("x", "y"))
+    assert float(off.max()) > 0.5
+    assert (off <= 2 * np.maximum(rows.stated_error, 1e-2)).all()
